@@ -286,6 +286,7 @@ IMPORT_NAMES = {
     "picsl-greedy": "picsl_greedy",
     "scikit-image": "skimage",
     "libigl": "igl",
+    "connected-components-3d": "cc3d",
     "PyYAML": "yaml",
     "pillow": "PIL",
     "Jinja2": "jinja2",

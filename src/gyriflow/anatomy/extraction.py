@@ -17,6 +17,7 @@ from ..errors import MeshError
 from ..geometry.boxes import Box, box_of, widened
 from ..geometry.deformations import voxel_size
 from ..geometry.triangles import Floats, Mask, TriangleMesh, signed_volume, transformed
+from ..geometry.voxels import INSIDE, OUTSIDE, connected_parts, distance_to
 
 PAD_VOXELS = 6
 # σ of the Gaussian that smooths a mask before its isosurface is extracted
@@ -29,10 +30,6 @@ MIN_SLIT_VOXELS = 20
 # a part at least this large, relative to the largest, is kept: hemispheres may not
 # touch
 COMPARABLE = 0.2
-# inside voxels are connected through faces only, outside voxels through edges and
-# corners too
-INSIDE = ndimage.generate_binary_structure(3, 1)
-OUTSIDE = ndimage.generate_binary_structure(3, 3)
 # the 27 cells of a 3 × 3 × 3 block, and bit masks of those that share a corner, an edge
 # or a face with the middle one
 CELLS = np.array(list(np.ndindex(3, 3, 3)))
@@ -106,7 +103,7 @@ def parts_in_boxes(mask: Mask) -> Iterator[tuple[Box, Mask]]:
     if not mask.any():
         return
     around = box_of(mask, 1)
-    number, _ = ndimage.label(mask[around], OUTSIDE)
+    number, _ = connected_parts(mask[around], OUTSIDE)
     boxes = ndimage.find_objects(number)
     for index, tight in enumerate(boxes, start=1):
         box = widened(tight, 1)
@@ -145,7 +142,7 @@ def remove_bridges(
     sulcus or the fissure. Its voxels get the value that places the surface at its
     walls. Small groups, and slits that would pierce the mask, stay closed.
     """
-    number, _ = ndimage.label(~mask)
+    number, _ = connected_parts(~mask)
     # the volume is padded, so its first voxel is outside
     closed = (number == number[0, 0, 0]) & (field > LEVEL)
     number, gains = _parts_with_gains(field > LEVEL, closed)
@@ -192,32 +189,10 @@ def refine(
 
 def without_holes(mask: Mask, structure: Mask = INSIDE) -> Mask:
     """Fill the holes of an (i, j, k) mask: what voxels outside, connected by a
-    structure, do not reach. A dilation from the border takes three times as long.
-    """
-    # an even number of voxels along each axis, with a margin outside
-    margins = [(2, 2 + size % 2) for size in mask.shape]
-    outside = np.pad(~mask, margins, constant_values=True)
-    inner = tuple(slice(2, 2 + size) for size in mask.shape)
-    if structure is not INSIDE:
-        number, _ = ndimage.label(outside, structure)
-        at_border = number[0, 0, 0]
-        return (number != at_border)[inner]
-
-    # blocks of eight voxels outside that reach the border, in half the time; then what
-    # touches these
-    blocks = outside
-    for axis in range(3):
-        along = np.moveaxis(blocks, axis, 0)
-        pairs = along[::2] & along[1::2]
-        blocks = np.moveaxis(pairs, 0, axis)
-    number, _ = ndimage.label(blocks)
-    at_border = number[0, 0, 0]
-    reached = number == at_border
-    is_reached = np.empty_like(outside)
-    for i, j, k in np.ndindex(2, 2, 2):
-        is_reached[i::2, j::2, k::2] = reached
-    holes = not_touching(outside & ~is_reached, is_reached)
-    return mask | holes[inner]
+    structure, do not reach."""
+    outside = np.pad(~mask, 1, constant_values=True)
+    number, _ = connected_parts(outside, structure)
+    return (number != number[0, 0, 0])[1:-1, 1:-1, 1:-1]
 
 
 def not_touching(mask: Mask, tissue: Mask) -> Mask:
@@ -255,7 +230,7 @@ def main_parts(
 
     `around` is a mask without cavities that contains this one, where there is one.
     """
-    number, count = ndimage.label(mask)
+    number, count = connected_parts(mask)
     sizes = np.bincount(number.ravel(), minlength=count + 1)
     sizes[0] = 0
     is_main = (sizes >= comparable * sizes.max()) & (sizes > 0)
@@ -549,11 +524,11 @@ def _parts_if_framed(mask: Mask) -> int:
     """Return the number of parts of a mask if all that reach the border of its box are
     connected."""
     framed = np.pad(mask, 1, constant_values=True)
-    return int(ndimage.label(framed, INSIDE)[1])
+    return connected_parts(framed)[1]
 
 
 def _pieces(mask: Mask) -> tuple[int, int]:
-    return ndimage.label(mask, INSIDE)[1], ndimage.label(~mask, OUTSIDE)[1]
+    return connected_parts(mask)[1], connected_parts(~mask, OUTSIDE)[1]
 
 
 def _euler_cells(mask: Mask) -> NDArray[np.int8]:
@@ -593,7 +568,7 @@ def _parts_with_gains(
 ) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
     """Label the parts of a `change` of the mask; return the labels, and by label the
     change of the Euler number."""
-    number, count = ndimage.label(change, OUTSIDE)
+    number, count = connected_parts(change, OUTSIDE)
     gain = _euler_cells(mask ^ change) - _euler_cells(mask)
     places = np.argwhere(gain)
     last = np.array(mask.shape) - 1
@@ -686,7 +661,7 @@ def without_stalks(mask: Mask, affine: Floats) -> tuple[Mask, list[dict[str, Any
     """
     size = voxel_size(affine)
     wide = ~dilated(~mask, NECK_RADIUS_MM, size)
-    number, count = ndimage.label(wide, INSIDE)
+    number, count = connected_parts(wide)
     if count < 2:
         return mask, []
     sizes = np.bincount(number.ravel())[1:]
@@ -703,11 +678,8 @@ def without_stalks(mask: Mask, affine: Floats) -> tuple[Mask, list[dict[str, Any
             int(reach / size.min()) + 2,
         )
         ball = number[box] == part + 1
-        near = ndimage.distance_transform_edt(~ball, sampling=size) <= reach
-        loose, _ = ndimage.label(
-            mask[box] & ~solid[box] & near,
-            INSIDE,
-        )
+        near = distance_to(ball, size) <= reach
+        loose, _ = connected_parts(mask[box] & ~solid[box] & near)
         cut = np.isin(
             loose,
             np.setdiff1d(loose[ball], 0),
@@ -728,7 +700,7 @@ def without_stalks(mask: Mask, affine: Floats) -> tuple[Mask, list[dict[str, Any
             hanging[box] |= cut
     if not hanging.any():
         return mask, []
-    number, count = ndimage.label(hanging, INSIDE)
+    number, count = connected_parts(hanging)
     remaining = mask & ~hanging
     return remaining, [
         {

@@ -23,8 +23,9 @@ from ..geometry.boxes import Box
 from ..geometry.deformations import transform_points, voxel_index, voxel_size
 from ..geometry.matching import nearest_on
 from ..geometry.triangles import Ints, TriangleMesh
+from ..geometry.voxels import OUTSIDE, connected_parts, distance_to
 from ..settings.terms import Side
-from .extraction import EDGE_SLOPE, OUTSIDE, SMOOTHING_VOXELS, Floats, Mask, dilated
+from .extraction import EDGE_SLOPE, SMOOTHING_VOXELS, Floats, Mask, dilated
 
 SAMPLES = 600
 DIRECTIONS = 400
@@ -502,7 +503,7 @@ def side_distance(
     size = voxel_size(affine)
     places = np.argwhere(core)
     height = fissure.height_above(transform_points(places, affine))
-    order = ndimage.distance_transform_edt(~core, sampling=size).astype(np.float32)
+    order = distance_to(core, size)
     order[core] = -np.abs(height)
     seeds = np.zeros(mask.shape, dtype=np.int8)
     if left is None or right is None:
@@ -531,10 +532,7 @@ def side_distance(
         (np.less, np.less_equal),
         strict=True,
     ):
-        to_left, to_right = (
-            ndimage.distance_transform_edt(flood[near] != part, sampling=size)
-            for part in (1, 2)
-        )
+        to_left, to_right = (distance_to(flood[near] == part, size) for part in (1, 2))
         distances.append(_signed_distance(compare(to_right, to_left), size))
     # only the side counts elsewhere
     margins = [
@@ -579,8 +577,8 @@ def _slices_between(
 def _signed_distance(mask: Mask, size: Floats) -> Floats:
     """Return each voxel's distance (mm) from the border of a mask, half a voxel from
     its voxels; negative outside."""
-    inside = ndimage.distance_transform_edt(mask, sampling=size)
-    outside = ndimage.distance_transform_edt(~mask, sampling=size)
+    inside = distance_to(~mask, size)
+    outside = distance_to(mask, size)
     sign = np.where(mask, 1.0, -1.0)
     half_voxel = 0.5 * size.mean() * sign
     distance = inside - outside - half_voxel
@@ -613,7 +611,7 @@ def hidden_fissure(
     wide = shows & ~dilated(sheet & ~shows, MIN_VISIBLE_MM, size)
     hidden = sheet & ~dilated(wide, MIN_VISIBLE_MM, size)
     if bridges:
-        number, _ = ndimage.label(
+        number, _ = connected_parts(
             brain & ~hidden & (np.abs(side_mm) < 0.45 * size.min()), OUTSIDE
         )
         sizes_mm2 = np.bincount(number.ravel()) * float(np.prod(size)) / size.min()
@@ -623,7 +621,7 @@ def hidden_fissure(
         ndimage.binary_dilation(core & part) & core & ~part
         for part in (is_right, ~is_right)
     ]
-    number, _ = ndimage.label(
+    number, _ = connected_parts(
         touching[0] | touching[1],
         OUTSIDE,
     )
@@ -631,7 +629,7 @@ def hidden_fissure(
     sizes[0] = 0
     joint = (number > 0) & (sizes >= MIN_JOINT * sizes.max())[number]
     above = sheet & ~dilated(joint, FLOOR_MM, size)
-    number, _ = ndimage.label(above, OUTSIDE)
+    number, _ = connected_parts(above, OUTSIDE)
     return (
         above
         & hidden
@@ -684,10 +682,10 @@ def plane_between_labels(
     """Fit a plane half-way between (i, j, k) labels of unequal sides, in and around a
     brain."""
     size = voxel_size(affine)
-    to_left = ndimage.distance_transform_edt(~left, sampling=size)
-    to_right = ndimage.distance_transform_edt(~right, sampling=size)
+    to_left = distance_to(left, size)
+    to_right = distance_to(right, size)
     side = to_left - to_right
-    to_brain = ndimage.distance_transform_edt(~brain, sampling=size)
+    to_brain = distance_to(brain, size)
     near = to_brain < MARGIN_MM
     is_between = near & (np.abs(side) < size.max())
     places = transform_points(np.argwhere(is_between), affine)

@@ -14,6 +14,7 @@ from scipy import ndimage
 from ..errors import InputError
 from ..geometry.boxes import Box, box_of
 from ..geometry.deformations import voxel_size
+from ..geometry.voxels import OUTSIDE, connected_parts, distance_to
 from ..settings.schemes import SCHEME_FILES, LabelScheme
 from ..units import ML_PER_MM3
 from . import extraction
@@ -416,9 +417,9 @@ def _unlabelled_ventricles(around: AroundCerebrum) -> Mask:
     tissue = np.pad(cerebrum[box], margin)
 
     # the cerebrum without its openings
-    to_tissue = ndimage.distance_transform_edt(~tissue, sampling=size)
+    to_tissue = distance_to(tissue, size)
     near = to_tissue <= CLOSING_MM
-    to_border = ndimage.distance_transform_edt(near, sampling=size)
+    to_border = distance_to(~near, size)
     closed = to_border > CLOSING_MM
     inside = extraction.without_holes(closed | tissue)
 
@@ -430,7 +431,7 @@ def _unlabelled_ventricles(around: AroundCerebrum) -> Mask:
     hit_share = _smoothed(hits, clear, 0.5 * RAY_SMOOTHING, WHOLE)
     needed = ENCLOSED if scheme.cortex else ENCLOSED_WITHOUT_CORTEX
     is_enclosed = clear & (hit_share > needed)
-    number, _ = ndimage.label(is_enclosed, extraction.OUTSIDE)
+    number, _ = connected_parts(is_enclosed, OUTSIDE)
     sizes = np.bincount(
         number.ravel(),
         minlength=2,

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
 
 from ..errors import InputError, MeshError
 from ..geometry import triangles
@@ -15,6 +14,7 @@ from ..geometry.alignment import angle_deg, motion
 from ..geometry.deformations import voxel_size
 from ..geometry.poses import CONVENTIONS, Pose
 from ..geometry.triangles import TriangleMesh
+from ..geometry.voxels import distance_to
 from ..settings.schemes import LabelScheme
 from ..settings.terms import FUSED_AFTER_GW, SIDES, Coordinates, Side
 from ..units import CM2_PER_MM2, ML_PER_MM3
@@ -311,9 +311,7 @@ def _with_fissure(
         )
         if not hidden.any():
             return field, affine, 0.0
-        to_hidden = ndimage.distance_transform_edt(~hidden, sampling=size).astype(
-            np.float32
-        )
+        to_hidden = distance_to(hidden, size)
         before, grid = field, affine
         wide = fissure.open_fissure(field, affine, side_mm, to_hidden)
         if factor > 1 and (field - wide).sum(dtype=float) > 1e-3 * field.sum(

@@ -13,6 +13,7 @@ from scipy import ndimage, sparse
 
 from ..errors import MeshError
 from ..geometry import remeshing, triangles
+from ..geometry.contraction import contracted
 from ..geometry.deformations import transform_points, voxel_index
 from ..geometry.matching import nearest_on, surface_mask
 from ..geometry.triangles import Ints, TriangleMesh
@@ -66,6 +67,9 @@ ROUNDS = 2
 # rounds that reset crossing walls, and the rings of neighbours that are reset with them
 # after smoothing
 N_RESETS, N_RESET_RINGS = 4, 3
+# a surface with shorter edges is contracted before it is remeshed, and the size of its
+# patches: both as shares of the wanted edge length
+FINE, PATCH = 0.5, 0.7
 # walls where the field before an opening was above this are walls of the opening
 INSIDE_LEVEL = 0.8
 
@@ -251,14 +255,22 @@ def _make_even(
     Walls of a narrow slit that keep crossing are not smoothed.
     """
     smooth = taubin_smoothed(mesh)
-    even, crossing, remaining = remeshing.untangle(
-        remeshing.remesh(smooth, edge_length_mm)
-    )
+    even, crossing, remaining = remeshing.untangle(_remeshed(smooth, edge_length_mm))
     if remaining:
         even, _, remaining = remeshing.untangle(
-            remeshing.remesh(_without_crossings(mesh, smooth), edge_length_mm)
+            _remeshed(_without_crossings(mesh, smooth), edge_length_mm)
         )
     return even, crossing, remaining
+
+
+def _remeshed(mesh: TriangleMesh, edge_length_mm: float) -> TriangleMesh:
+    """Remesh a closed surface; a much finer one, as that of a refined volume, in a
+    third of the time, since its patches are contracted first."""
+    # of equilateral triangles of the same area
+    own_length_mm = np.sqrt(triangles.area(mesh) / len(mesh.faces) * 4 / 3**0.5)
+    if own_length_mm < FINE * edge_length_mm:
+        mesh = contracted(mesh, PATCH * edge_length_mm)
+    return remeshing.remesh(mesh, edge_length_mm)
 
 
 def _without_crossings(mesh: TriangleMesh, smooth: TriangleMesh) -> TriangleMesh:
@@ -558,7 +570,7 @@ def _with_caps(mesh: TriangleMesh, loops: list[Ints]) -> tuple[TriangleMesh, Mas
     mean_mm = triangles.edge_lengths(mesh.vertices, rims).mean()
     length = remeshing.pymeshlab.PureValue(float(mean_mm))
     document.meshing_isotropic_explicit_remeshing(
-        iterations=remeshing.REMESHING_ROUNDS,
+        iterations=remeshing.MANY_ROUNDS,
         targetlen=length,
         featuredeg=remeshing.SHARP_DEG,
         checksurfdist=False,

@@ -19,11 +19,10 @@ from scipy.spatial import cKDTree
 
 from ..geometry.boxes import Box
 from ..geometry.deformations import transform_points, voxel_size
+from ..geometry.voxels import INSIDE, OUTSIDE, connected_parts, distance_to
 from ..units import ML_PER_MM3
 from .extraction import (
-    INSIDE,
     LEVEL,
-    OUTSIDE,
     Floats,
     Mask,
     is_simple,
@@ -138,10 +137,7 @@ def open_fused_sulci(
             None if side_mm is None else side_mm[part],
         )
     # the depth of a sheet is measured on coarse voxels, in an eighth of the time
-    below = ndimage.distance_transform_edt(
-        near > LEVEL,
-        sampling=voxel_size(affine),
-    )
+    below = distance_to(near <= LEVEL, voxel_size(affine))
     depth = sample(
         below,
         grid,
@@ -236,7 +232,7 @@ def _deep_sheets(
 ) -> tuple[Mask, int]:
     """Return the large parts of a mask from `at_surface` to places where `is_deep` (n,)
     holds, and their number."""
-    number, count = ndimage.label(sheet, OUTSIDE)
+    number, count = connected_parts(sheet, OUTSIDE)
     part, parts = number[sheet], np.arange(count + 1)
     large = (
         np.bincount(part, minlength=count + 1) * size_mm.prod() ** (2 / 3)

@@ -26,6 +26,7 @@ from ..geometry.triangles import (
     vertex_areas,
     vertex_normals,
 )
+from ..geometry.voxels import distance_to
 from ..settings.schemes import FILLED, LabelScheme
 from ..settings.terms import SIDES, Side
 from .extraction import (
@@ -159,8 +160,8 @@ def _cortical_thickness(
         0.5 * float(np.linalg.norm(size)),
     )
     to_cortex, to_outside = (
-        sample(ndimage.distance_transform_edt(mask, sampling=size), affine, points)
-        for mask in (~cortex.mask, cortex.cerebrum)
+        sample(distance_to(mask, size), affine, points)
+        for mask in (cortex.mask, ~cortex.cerebrum)
     )
     at_labels = to_outside < MAX_OUTSIDE_VOXELS * voxel
     over_cortex = to_cortex < NEAR_VOXELS * voxel
@@ -502,7 +503,7 @@ def _narrow_gaps(
     wide."""
     voxel = float(affine[0, 0])
     radius = 0.5 * (FISSURE_MM + voxel)
-    near = ndimage.distance_transform_edt(~inside, sampling=voxel) <= radius
-    closed = ndimage.distance_transform_edt(near, sampling=voxel) > radius
+    near = distance_to(inside, voxel) <= radius
+    closed = distance_to(~near, voxel) > radius
     x = affine[0, 3] + voxel * np.arange(inside.shape[0])
     return closed & (np.abs(x - fissure_x_mm) <= FISSURE_REACH_MM)[:, None, None]

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-from scipy.ndimage import distance_transform_edt
 
 from ..errors import InputError
 from ..geometry.alignment import align
@@ -19,6 +18,7 @@ from ..geometry.triangles import (
     transformed,
     vertex_areas,
 )
+from ..geometry.voxels import distance_to
 from ..metrics.curvature import curvature
 from ..quantities import COMPARED_MAPS
 from ..settings.terms import CURVATURE_RADIUS_MM
@@ -31,6 +31,7 @@ edges."""
 CORTEX_MM, VOXEL_MM = 2.0, 0.8
 """Depth of the layer that counts as cortex in `cortex_dice`, and edge of the voxels
 that are counted."""
+DEPTH_TOL_MM = 1e-3
 MAX_VOXELS = 1 << 20
 """Largest number of voxels along a direction."""
 
@@ -171,9 +172,10 @@ def _ribbon(mesh: TriangleMesh) -> Ints:
     corner = np.floor(lowest / VOXEL_MM) * VOXEL_MM
     box = np.stack([corner, highest])
     mask, affine = surface_mask(mesh, VOXEL_MM, box)
-    # distances are to the centres of voxels outside, half a voxel beyond the surface
-    depth = distance_transform_edt(mask, sampling=VOXEL_MM) - VOXEL_MM / 2
-    in_cortex = (mask > 0) & (depth <= CORTEX_MM)
+    # distances are to the centres of voxels outside, half a voxel beyond the surface;
+    # some are as deep as the layer but for rounding, which is not to decide
+    depth = distance_to(mask == 0, VOXEL_MM) - VOXEL_MM / 2
+    in_cortex = (mask > 0) & (depth < CORTEX_MM - DEPTH_TOL_MM)
     first_voxel = np.rint(affine[:3, 3] / VOXEL_MM).astype(np.int64)
     voxels = np.argwhere(in_cortex) + first_voxel
     digits = MAX_VOXELS ** np.arange(3)

@@ -7,7 +7,10 @@ from scipy.spatial import cKDTree
 
 from .triangles import Mask, TriangleMesh, corners, edge_lengths, edges, submesh
 
-REMESHING_ROUNDS = 5
+FEW_ROUNDS, MANY_ROUNDS = 2, 5
+"""Rounds of remeshing where edges are about as long as wanted, and elsewhere."""
+NEAR_LENGTHS = (0.5, 2.0)
+"""Least median and largest length of edges about as long as wanted, as multiples."""
 UNTANGLING_ROUNDS = 10
 # MeshLab's default
 SHARP_DEG = 30.0
@@ -61,11 +64,17 @@ def made_even(mesh: TriangleMesh, edge_length_mm: float) -> TriangleMesh:
 def remesh(
     mesh: TriangleMesh,
     edge_length_mm: float,
-    rounds: int = REMESHING_ROUNDS,
+    rounds: int | None = None,
     sharp_deg: float = SHARP_DEG,
 ) -> TriangleMesh:
     """Return the surface with even triangles of an edge length (mm); edges sharper than
     `sharp_deg` are kept."""
+    if rounds is None:
+        pairs, _ = edges(mesh)
+        lengths = edge_lengths(mesh.vertices, pairs) / edge_length_mm
+        least, largest = NEAR_LENGTHS
+        is_near = np.median(lengths) > least and lengths.max() < largest
+        rounds = FEW_ROUNDS if is_near else MANY_ROUNDS
     document = in_meshlab(mesh)
     length = pymeshlab.PureValue(edge_length_mm)
     # MeshLab remembers `selectedonly` of an earlier call
