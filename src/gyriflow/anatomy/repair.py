@@ -67,9 +67,8 @@ ROUNDS = 2
 # rounds that reset crossing walls, and the rings of neighbours that are reset with them
 # after smoothing
 N_RESETS, N_RESET_RINGS = 4, 3
-# a surface with shorter edges is contracted before it is remeshed, and the size of its
-# patches: both as shares of the wanted edge length
-FINE, PATCH = 0.5, 0.7
+# size of the patches that are contracted, as a share of the wanted edge length
+PATCH = 0.7
 # walls where the field before an opening was above this are walls of the opening
 INSIDE_LEVEL = 0.8
 
@@ -268,7 +267,7 @@ def _remeshed(mesh: TriangleMesh, edge_length_mm: float) -> TriangleMesh:
     third of the time, since its patches are contracted first."""
     # of equilateral triangles of the same area
     own_length_mm = np.sqrt(triangles.area(mesh) / len(mesh.faces) * 4 / 3**0.5)
-    if own_length_mm < FINE * edge_length_mm:
+    if own_length_mm < remeshing.FINE * edge_length_mm:
         mesh = contracted(mesh, PATCH * edge_length_mm)
     return remeshing.remesh(mesh, edge_length_mm)
 

@@ -8,9 +8,9 @@ from scipy.spatial import cKDTree
 from .triangles import Mask, TriangleMesh, corners, edge_lengths, edges, submesh
 
 FEW_ROUNDS, MANY_ROUNDS = 2, 5
-"""Rounds of remeshing where edges are about as long as wanted, and elsewhere."""
-NEAR_LENGTHS = (0.5, 2.0)
-"""Least median and largest length of edges about as long as wanted, as multiples."""
+"""Least rounds of remeshing, and those of a much finer surface or a few large faces."""
+FINE = 0.5
+"""Share of the wanted length below which edges are much finer."""
 UNTANGLING_ROUNDS = 10
 # MeshLab's default
 SHARP_DEG = 30.0
@@ -72,9 +72,10 @@ def remesh(
     if rounds is None:
         pairs, _ = edges(mesh)
         lengths = edge_lengths(mesh.vertices, pairs) / edge_length_mm
-        least, largest = NEAR_LENGTHS
-        is_near = np.median(lengths) > least and lengths.max() < largest
-        rounds = FEW_ROUNDS if is_near else MANY_ROUNDS
+        # each round halves the edges that are too long
+        n_halvings = int(np.ceil(np.log2(lengths.max() / EVEN_LENGTHS[1])))
+        is_fine = np.median(lengths) < FINE
+        rounds = MANY_ROUNDS if is_fine else max(FEW_ROUNDS, n_halvings + 1)
     document = in_meshlab(mesh)
     length = pymeshlab.PureValue(edge_length_mm)
     # MeshLab remembers `selectedonly` of an earlier call
