@@ -338,7 +338,8 @@ def test_imported_packages_are_dependencies():
 def test_conda_environment_sets_what_run_sets():
     lines = (ROOT / "run").read_text().splitlines()
     settings = [line for line in lines if line.startswith("export") and ":-" in line]
-    pairs = re.findall(r"\b([A-Z]\w+)=(?:\$\{\w+:-)?([\w:,.=]+)\}?", "\n".join(settings))
+    assigned = r"\b([A-Z]\w+)=(?:\$\{\w+:-)?([\w:,.=]+)\}?"
+    pairs = re.findall(assigned, "\n".join(settings))
     exports = dict(pairs)
     environment = yaml.safe_load((ROOT / "envs" / "gyriflow.yaml").read_text())
     # what concerns the checkout and the user's Python is the launcher's own

@@ -23,7 +23,7 @@ from ..geometry.boxes import Box
 from ..geometry.deformations import transform_points, voxel_index, voxel_size
 from ..geometry.matching import nearest_on
 from ..geometry.triangles import Ints, TriangleMesh
-from ..geometry.voxels import OUTSIDE, connected_parts, distance_to
+from ..geometry.voxels import OUTSIDE, distance_to, number_parts
 from ..settings.terms import Side
 from .extraction import EDGE_SLOPE, SMOOTHING_VOXELS, Floats, Mask, dilated
 
@@ -611,7 +611,7 @@ def hidden_fissure(
     wide = shows & ~dilated(sheet & ~shows, MIN_VISIBLE_MM, size)
     hidden = sheet & ~dilated(wide, MIN_VISIBLE_MM, size)
     if bridges:
-        number, _ = connected_parts(
+        number, _ = number_parts(
             brain & ~hidden & (np.abs(side_mm) < 0.45 * size.min()), OUTSIDE
         )
         sizes_mm2 = np.bincount(number.ravel()) * float(np.prod(size)) / size.min()
@@ -621,7 +621,7 @@ def hidden_fissure(
         ndimage.binary_dilation(core & part) & core & ~part
         for part in (is_right, ~is_right)
     ]
-    number, _ = connected_parts(
+    number, _ = number_parts(
         touching[0] | touching[1],
         OUTSIDE,
     )
@@ -629,7 +629,7 @@ def hidden_fissure(
     sizes[0] = 0
     joint = (number > 0) & (sizes >= MIN_JOINT * sizes.max())[number]
     above = sheet & ~dilated(joint, FLOOR_MM, size)
-    number, _ = connected_parts(above, OUTSIDE)
+    number, _ = number_parts(above, OUTSIDE)
     return (
         above
         & hidden

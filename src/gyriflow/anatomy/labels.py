@@ -14,7 +14,7 @@ from scipy import ndimage
 from ..errors import InputError
 from ..geometry.boxes import Box, box_of
 from ..geometry.deformations import voxel_size
-from ..geometry.voxels import OUTSIDE, connected_parts, distance_to
+from ..geometry.voxels import OUTSIDE, distance_to, number_parts
 from ..settings.schemes import SCHEME_FILES, LabelScheme
 from ..units import ML_PER_MM3
 from . import extraction
@@ -431,7 +431,7 @@ def _unlabelled_ventricles(around: AroundCerebrum) -> Mask:
     hit_share = _smoothed(hits, clear, 0.5 * RAY_SMOOTHING, WHOLE)
     needed = ENCLOSED if scheme.cortex else ENCLOSED_WITHOUT_CORTEX
     is_enclosed = clear & (hit_share > needed)
-    number, _ = connected_parts(is_enclosed, OUTSIDE)
+    number, _ = number_parts(is_enclosed, OUTSIDE)
     sizes = np.bincount(
         number.ravel(),
         minlength=2,

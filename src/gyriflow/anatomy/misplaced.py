@@ -8,7 +8,7 @@ import numpy as np
 
 from ..geometry.boxes import box_of
 from ..geometry.deformations import transform_points, voxel_size
-from ..geometry.voxels import OUTSIDE, connected_parts
+from ..geometry.voxels import OUTSIDE, number_parts
 from ..settings.schemes import LabelScheme
 from ..units import ML_PER_MM3
 from .extraction import (
@@ -199,7 +199,7 @@ def _bare_surface(around: AroundCerebrum) -> Iterator[str]:
         MAX_TO_CORTEX_MM,
     )
     if is_bare.sum() > n_max:
-        piece, _ = connected_parts(is_bare, OUTSIDE)
+        piece, _ = number_parts(is_bare, OUTSIDE)
         largest = np.bincount(piece[is_bare]).argmax()
         place = _place_in_words(np.argwhere(piece == largest), around.affine)
         share = is_bare.sum() / surface.sum()
@@ -230,7 +230,7 @@ def _pieces_in_words(mask: Mask, affine: Floats) -> str:
     voxel_ml = float(abs(np.linalg.det(affine[:3, :3]))) * ML_PER_MM3
     if mask.sum() * voxel_ml < MIN_PIECE_ML:
         return ""
-    number, _ = connected_parts(mask, OUTSIDE)
+    number, _ = number_parts(mask, OUTSIDE)
     volumes_ml = np.bincount(number.ravel()) * voxel_ml
     volumes_ml[0] = 0.0
     pieces_ml = volumes_ml[volumes_ml >= MIN_PIECE_ML]

@@ -13,7 +13,7 @@ from scipy import ndimage, sparse
 
 from ..errors import MeshError
 from ..geometry import remeshing, triangles
-from ..geometry.contraction import contracted
+from ..geometry.contraction import contract
 from ..geometry.deformations import transform_points, voxel_index
 from ..geometry.matching import nearest_on, surface_mask
 from ..geometry.triangles import Ints, TriangleMesh
@@ -68,7 +68,7 @@ ROUNDS = 2
 # after smoothing
 N_RESETS, N_RESET_RINGS = 4, 3
 # size of the patches that are contracted, as a share of the wanted edge length
-PATCH = 0.7
+PATCH_SHARE = 0.7
 # walls where the field before an opening was above this are walls of the opening
 INSIDE_LEVEL = 0.8
 
@@ -251,25 +251,21 @@ def _make_even(
     """Smooth, remesh and untangle a surface; also count crossing faces before, and
     those that remain.
 
-    Walls of a narrow slit that keep crossing are not smoothed.
+    A surface with much shorter edges, as of a refined volume, is contracted first,
+    which is faster. Walls of a narrow slit that keep crossing are not smoothed.
     """
     smooth = taubin_smoothed(mesh)
-    even, crossing, remaining = remeshing.untangle(_remeshed(smooth, edge_length_mm))
+    few = smooth
+    if remeshing.is_fine(smooth, edge_length_mm):
+        few = contract(smooth, PATCH_SHARE * edge_length_mm)
+    even, crossing, remaining = remeshing.untangle(
+        remeshing.remesh(few, edge_length_mm)
+    )
     if remaining:
         even, _, remaining = remeshing.untangle(
-            _remeshed(_without_crossings(mesh, smooth), edge_length_mm)
+            remeshing.remesh(_without_crossings(mesh, smooth), edge_length_mm)
         )
     return even, crossing, remaining
-
-
-def _remeshed(mesh: TriangleMesh, edge_length_mm: float) -> TriangleMesh:
-    """Remesh a closed surface; a much finer one, as that of a refined volume, in a
-    third of the time, since its patches are contracted first."""
-    # of equilateral triangles of the same area
-    own_length_mm = np.sqrt(triangles.area(mesh) / len(mesh.faces) * 4 / 3**0.5)
-    if own_length_mm < remeshing.FINE * edge_length_mm:
-        mesh = contracted(mesh, PATCH * edge_length_mm)
-    return remeshing.remesh(mesh, edge_length_mm)
 
 
 def _without_crossings(mesh: TriangleMesh, smooth: TriangleMesh) -> TriangleMesh:
@@ -569,7 +565,7 @@ def _with_caps(mesh: TriangleMesh, loops: list[Ints]) -> tuple[TriangleMesh, Mas
     mean_mm = triangles.edge_lengths(mesh.vertices, rims).mean()
     length = remeshing.pymeshlab.PureValue(float(mean_mm))
     document.meshing_isotropic_explicit_remeshing(
-        iterations=remeshing.MANY_ROUNDS,
+        iterations=remeshing.FINE_ROUNDS,
         targetlen=length,
         featuredeg=remeshing.SHARP_DEG,
         checksurfdist=False,

@@ -19,7 +19,7 @@ from scipy.spatial import cKDTree
 
 from ..geometry.boxes import Box
 from ..geometry.deformations import transform_points, voxel_size
-from ..geometry.voxels import INSIDE, OUTSIDE, connected_parts, distance_to
+from ..geometry.voxels import INSIDE, OUTSIDE, distance_to, number_parts
 from ..units import ML_PER_MM3
 from .extraction import (
     LEVEL,
@@ -232,7 +232,7 @@ def _deep_sheets(
 ) -> tuple[Mask, int]:
     """Return the large parts of a mask from `at_surface` to places where `is_deep` (n,)
     holds, and their number."""
-    number, count = connected_parts(sheet, OUTSIDE)
+    number, count = number_parts(sheet, OUTSIDE)
     part, parts = number[sheet], np.arange(count + 1)
     large = (
         np.bincount(part, minlength=count + 1) * size_mm.prod() ** (2 / 3)

@@ -32,6 +32,7 @@ CORTEX_MM, VOXEL_MM = 2.0, 0.8
 """Depth of the layer that counts as cortex in `cortex_dice`, and edge of the voxels
 that are counted."""
 DEPTH_TOL_MM = 1e-3
+"""Depths this close to `CORTEX_MM` count as equal to it."""
 MAX_VOXELS = 1 << 20
 """Largest number of voxels along a direction."""
 
@@ -173,7 +174,7 @@ def _ribbon(mesh: TriangleMesh) -> Ints:
     box = np.stack([corner, highest])
     mask, affine = surface_mask(mesh, VOXEL_MM, box)
     # distances are to the centres of voxels outside, half a voxel beyond the surface;
-    # some are as deep as the layer but for rounding, which is not to decide
+    # voxels exactly as deep as the layer are left out, whatever the rounding
     depth = distance_to(mask == 0, VOXEL_MM) - VOXEL_MM / 2
     in_cortex = (mask > 0) & (depth < CORTEX_MM - DEPTH_TOL_MM)
     first_voxel = np.rint(affine[:3, 3] / VOXEL_MM).astype(np.int64)

@@ -13,35 +13,39 @@ from .triangles import (
     vertex_normals,
 )
 
-# grids of cells that divide a surface into patches: each is finer than the one before,
-# and shifted, so that its cells meet elsewhere
-N_GRIDS, FINER, SHIFT = 12, 0.6, 0.37
+# grids of cells that divide a surface into patches: each grid's cells are smaller by
+# this ratio, and shifted, so that their borders lie elsewhere
+N_GRIDS, GRID_RATIO, GRID_SHIFT = 12, 0.6, 0.37
 # cells along an axis of a grid
 MAX_CELLS = 2**16
-# a patch is flat enough if the mean of its unit normals is as long
+# a patch is flat enough if the mean of its unit normals is at least this long
 MIN_MEAN_NORMAL = 0.75
+# faces around a vertex of a closed surface
+MIN_FACES = 3
 
 
-def contracted(mesh: TriangleMesh, size_mm: float) -> TriangleMesh:
-    """Return a closed surface with one vertex for each patch of at most `size_mm` of
-    the given one.
+def contract(mesh: TriangleMesh, size_mm: float) -> TriangleMesh:
+    """Contract each small patch of a closed surface to one vertex, in the same
+    topology.
 
-    Each vertex is in the middle of its patch, on the plane that touches the surface
-    there. Bent patches are smaller, as those at the edge of a narrow sulcus.
+    A patch lies in a cube of edge `size_mm`. Its vertex is the mean of its vertices,
+    moved to the tangent plane at the middle one. Bent patches, as at the rim of a
+    narrow sulcus, are smaller.
     """
-    patch, faces = _patches(mesh, size_mm)
+    normals = vertex_normals(mesh)
+    patch, faces = _patches(mesh, normals, size_mm)
     sizes = np.bincount(patch)
     centres = _sums(patch, mesh.vertices) / sizes[:, None]
     distances = np.linalg.norm(mesh.vertices - centres[patch], axis=1)
     by_patch = np.lexsort((distances, patch))
     middle = by_patch[np.cumsum(sizes) - sizes]
-    # the centre of a curved patch is inside the curve
-    normals = vertex_normals(mesh)[middle]
-    heights = dots(mesh.vertices[middle] - centres, normals)
-    return TriangleMesh(centres + heights[:, None] * normals, faces)
+    # the mean of a curved patch lies off the surface
+    upright = normals[middle]
+    heights = dots(mesh.vertices[middle] - centres, upright)
+    return TriangleMesh(centres + heights[:, None] * upright, faces)
 
 
-def _patches(mesh: TriangleMesh, size_mm: float) -> tuple[Ints, Ints]:
+def _patches(mesh: TriangleMesh, normals: Floats, size_mm: float) -> tuple[Ints, Ints]:
     """Return the patch (n,) of each vertex of a closed surface, and the (m, 3) faces
     between patches, which have the surface's topology.
 
@@ -53,25 +57,27 @@ def _patches(mesh: TriangleMesh, size_mm: float) -> tuple[Ints, Ints]:
     pairs = ends.reshape(-1, 2)
     # each edge once
     pairs = pairs[pairs[:, 0] < pairs[:, 1]]
-    normals = vertex_normals(mesh)
     places = mesh.vertices - mesh.vertices.min(axis=0)
     cell = np.zeros(n_vertices, dtype=np.int64)
-    is_divided = np.ones(n_vertices, dtype=bool)
+    needs_division = np.ones(n_vertices, dtype=bool)
     for grid in range(N_GRIDS):
-        place = np.floor(places[is_divided] / size_mm + SHIFT * grid)
+        place = np.floor(places[needs_division] / size_mm + GRID_SHIFT * grid)
         number = place @ [MAX_CELLS**2, MAX_CELLS, 1]
-        cell[is_divided] = number + grid * MAX_CELLS**3
-        size_mm *= FINER
+        cell[needs_division] = number + grid * MAX_CELLS**3
+        size_mm *= GRID_RATIO
 
         first, second = cell[pairs].T
         inner_edges = pairs[first == second]
         patch = connected(inner_edges, n_vertices).astype(np.int64)
         faces, is_bad = _faces_between(mesh.faces, patch, inner_edges)
         lengths = np.linalg.norm(_sums(patch, normals), axis=1)
-        is_bad |= lengths < MIN_MEAN_NORMAL * np.bincount(patch)
+        sizes = np.bincount(patch)
+        is_bad |= lengths < MIN_MEAN_NORMAL * sizes
+        # a single vertex cannot be divided
+        is_bad &= sizes > 1
         if not is_bad.any():
             return patch, faces
-        is_divided = is_bad[patch]
+        needs_division = is_bad[patch]
     return np.arange(n_vertices), mesh.faces
 
 
@@ -79,20 +85,22 @@ def _faces_between(faces: Ints, patch: Ints, inner_edges: Ints) -> tuple[Ints, M
     """Return the faces between patches, and the mask of the patches that would change
     the topology.
 
-    `inner_edges` (k, 2) are those within patches. The topology stays if each patch is
-    connected and has no hole, so that its Euler number is 1, and no two patches meet
-    twice.
+    `inner_edges` (k, 2) are those within patches. The topology stays the same if each
+    patch is a disk (connected, Euler number 1) with three faces or more around it, and
+    two patches share at most one edge.
     """
     n_patches = int(patch.max()) + 1
     corners = patch[faces]
     n_inner_edges = (corners == np.roll(corners, -1, axis=1)).sum(axis=1)
     inner_faces = corners[n_inner_edges == 3, 0]
-    vertices_of = np.bincount(patch)
-    edges_of = np.bincount(patch[inner_edges[:, 0]], minlength=n_patches)
-    faces_of = np.bincount(inner_faces, minlength=n_patches)
-    is_bad = vertices_of - edges_of + faces_of != 1
+    n_vertices = np.bincount(patch)
+    n_edges = np.bincount(patch[inner_edges[:, 0]], minlength=n_patches)
+    n_faces = np.bincount(inner_faces, minlength=n_patches)
+    is_bad = n_vertices - n_edges + n_faces != 1
 
     between = corners[n_inner_edges == 0]
+    n_around = np.bincount(between.ravel(), minlength=n_patches)
+    is_bad |= n_around < MIN_FACES
     half_edges = between * n_patches + np.roll(between, -1, axis=1)
     ordered = np.sort(half_edges.ravel())
     repeated = ordered[1:][np.diff(ordered) == 0]

@@ -5,12 +5,12 @@ import numpy as np
 import pymeshlab
 from scipy.spatial import cKDTree
 
-from .triangles import Mask, TriangleMesh, corners, edge_lengths, edges, submesh
+from .triangles import Floats, Mask, TriangleMesh, corners, edge_lengths, edges, submesh
 
-FEW_ROUNDS, MANY_ROUNDS = 2, 5
-"""Least rounds of remeshing, and those of a much finer surface or a few large faces."""
-FINE = 0.5
-"""Share of the wanted length below which edges are much finer."""
+MIN_ROUNDS, FINE_ROUNDS, MAX_ROUNDS = 2, 5, 10
+"""Rounds of remeshing: fewest, of a fine surface or a cap, and most."""
+FINE_SHARE = 0.5
+"""A surface is fine if its median edge is below this share of the wanted length."""
 UNTANGLING_ROUNDS = 10
 # MeshLab's default
 SHARP_DEG = 30.0
@@ -68,14 +68,12 @@ def remesh(
     sharp_deg: float = SHARP_DEG,
 ) -> TriangleMesh:
     """Return the surface with even triangles of an edge length (mm); edges sharper than
-    `sharp_deg` are kept."""
+    `sharp_deg` are kept.
+
+    `rounds` are as many as the longest edge needs, if they are not given.
+    """
     if rounds is None:
-        pairs, _ = edges(mesh)
-        lengths = edge_lengths(mesh.vertices, pairs) / edge_length_mm
-        # each round halves the edges that are too long
-        n_halvings = int(np.ceil(np.log2(lengths.max() / EVEN_LENGTHS[1])))
-        is_fine = np.median(lengths) < FINE
-        rounds = MANY_ROUNDS if is_fine else max(FEW_ROUNDS, n_halvings + 1)
+        rounds = _rounds_for(mesh, edge_length_mm)
     document = in_meshlab(mesh)
     length = pymeshlab.PureValue(edge_length_mm)
     # MeshLab remembers `selectedonly` of an earlier call
@@ -87,6 +85,25 @@ def remesh(
         selectedonly=False,
     )
     return from_meshlab(document)
+
+
+def is_fine(mesh: TriangleMesh, edge_length_mm: float) -> bool:
+    """Return whether a surface's edges are much shorter than a length (mm)."""
+    return bool(np.median(_side_lengths(mesh)) < FINE_SHARE * edge_length_mm)
+
+
+def _rounds_for(mesh: TriangleMesh, edge_length_mm: float) -> int:
+    longest = _side_lengths(mesh).max() / edge_length_mm
+    least = FINE_ROUNDS if is_fine(mesh, edge_length_mm) else MIN_ROUNDS
+    # each round halves the edges that are too long
+    n_halvings = np.ceil(np.log2(max(longest / EVEN_LENGTHS[1], 1.0)))
+    return int(np.clip(n_halvings + 1, least, MAX_ROUNDS))
+
+
+def _side_lengths(mesh: TriangleMesh) -> Floats:
+    """Return the (m, 3) lengths of the sides of faces."""
+    places = corners(mesh)
+    return np.linalg.norm(np.roll(places, -1, axis=1) - places, axis=2)
 
 
 def decimate(mesh: TriangleMesh, vertices: int) -> TriangleMesh:
