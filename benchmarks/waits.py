@@ -8,7 +8,8 @@ CONFIG is a configuration, for example of one brain from labels; one in this che
 stands for that of each checkout. `--command` is `measure`, `run`, `check` or `init`,
 which needs the folder of the scans instead. Both checkouts run it in new folders in
 FOLDER, up to the STAGE or the file of this name if there is one: on one core each at
-the same time, so that they have the same load, and on several cores in turn.
+the same time, so that they have the same load (the faster one runs once more meanwhile,
+which is not counted), and on several cores in turn.
 
 The first table has, for each kind of step and run, processor time as its steps have
 recorded it, with child processes (s; median, smallest and largest of the repeats), and
@@ -26,6 +27,7 @@ stage before metrics has no tables. The last line is one JSON object.
 
 import argparse
 import os
+import resource
 import shutil
 import subprocess
 import time
@@ -105,6 +107,14 @@ def wait_for(process: subprocess.Popen) -> float:
     """Wait for a process; return its processor time with that of its children (s);
     CalledProcessError if it fails."""
     _, status, usage = os.wait4(process.pid, 0)
+    return time_of(process, status, usage)
+
+
+def time_of(
+    process: subprocess.Popen, status: int, usage: resource.struct_rusage
+) -> float:
+    """Return the processor time (s) of a process that ended with a status;
+    CalledProcessError if it failed."""
     process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode:
         raise subprocess.CalledProcessError(process.returncode, process.args)
@@ -117,19 +127,35 @@ def take_times(
     """Run a command with each checkout in its folder; return by checkout processor time
     as `whole`, and time by the clock as `wall` if they run in turn."""
     if command.cores == 1:
-        running = {
-            checkout: start(command, checkout, folder)
-            for checkout, folder in folders.items()
-        }
-        return {
-            checkout: {"whole": wait_for(process)}
-            for checkout, process in running.items()
-        }
+        return take_times_together(command, folders)
     times = {}
     for checkout, folder in folders.items():
         started = time.monotonic()
         cpu_s = wait_for(start(command, checkout, folder))
         times[checkout] = {"whole": cpu_s, "wall": time.monotonic() - started}
+    return times
+
+
+def take_times_together(
+    command: Command, folders: Mapping[Path, Path]
+) -> dict[Path, dict[str, float]]:
+    """Run a command with both checkouts at the same time; the one that ends first runs
+    again until the other ends, which has the same load to its end then."""
+    running = {}
+    for checkout, folder in folders.items():
+        process = start(command, checkout, folder)
+        running[process.pid] = checkout, process
+    ended, status, usage = os.wait4(-1, 0)
+    first, process = running.pop(ended)
+    times = {first: {"whole": time_of(process, status, usage)}}
+    spare = folders[first].with_name("load")
+    shutil.rmtree(spare, ignore_errors=True)
+    spare.mkdir()
+    load = start(command, first, spare)
+    ((second, process),) = running.values()
+    times[second] = {"whole": wait_for(process)}
+    load.terminate()
+    load.wait()
     return times
 
 
