@@ -41,9 +41,9 @@ FUSED_SHARE = {"pial": 0.53, "series": 0.5, "prediction": 0.2}
 `open_sulci: false`, over that with opened sulci."""
 PREDICTION_SECONDS, PREDICTION_SECONDS_PER_ELEMENT_AND_WEEK = 10.0, 1.2e-4
 """To place a mesh in an atlas, and to follow the shapes that are predicted for it."""
-MESHING_SECONDS_PER_ELEMENT = {"pytetwild": 2.7e-4, "tetgen": 5.4e-5}
+MESHING_SECONDS_PER_ELEMENT = {"pytetwild": 2.4e-4, "tetgen": 5.4e-5}
 """By mesher; of elements of the mesh, linear or quadratic."""
-SECONDS_PER_ML = {"register": 0.088, "pial": 0.13}
+SECONDS_PER_ML = {"register": 0.088, "pial": 0.105}
 """By stage, for each mL of the (later) brain, whose labels are registered or surfaced
 voxel by voxel; 22 to 38 GW."""
 SECONDS_PER_VERTEX, SECONDS_PER_VERTEX_AND_MODE = 1.4e-4, 8.3e-7
