@@ -16,8 +16,8 @@ UNTANGLING_ROUNDS = 10
 SHARP_DEG = 30.0
 EVEN_LENGTHS, EVEN_SHARE = (4 / 5, 4 / 3), 0.75
 """Multiples of the wanted length between which remeshing leaves an edge as it is, and
-the share of such edges from which a surface counts as even. Remeshing leaves 0.8 to 0.9,
-and 0.65 in the narrow sulci of late brains."""
+the share of such edges from which a surface counts as even. Remeshing leaves 0.8 to
+0.9, and 0.65 in the narrow sulci of late brains."""
 EVENNESS = 0.1
 """Weight of even triangles against distance in decimation. By MeshLab's default of
 0.001 triangles are long across folds, and spectra of copies have too much power in
