@@ -121,6 +121,12 @@ def time_of(
     return usage.ru_utime + usage.ru_stime
 
 
+def make_anew(folder: Path) -> None:
+    """Make an empty folder, in place of one that is there."""
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+
+
 def take_times(
     command: Command, folders: Mapping[Path, Path]
 ) -> dict[Path, dict[str, float]]:
@@ -149,8 +155,7 @@ def take_times_together(
     first, process = running.pop(ended)
     times = {first: {"whole": time_of(process, status, usage)}}
     spare = folders[first].with_name("load")
-    shutil.rmtree(spare, ignore_errors=True)
-    spare.mkdir()
+    make_anew(spare)
     load = start(command, first, spare)
     ((second, process),) = running.values()
     times[second] = {"whole": wait_for(process)}
@@ -165,8 +170,7 @@ def make_studies(
     """Run a command with each checkout in its folder, made anew, and reading commands
     once more; return the times by checkout and name."""
     for folder in folders.values():
-        shutil.rmtree(folder, ignore_errors=True)
-        folder.mkdir(parents=True)
+        make_anew(folder)
     times = take_times(command, folders)
     if command.is_reading:
         for checkout, again in take_times(command, folders).items():

@@ -192,7 +192,9 @@ def without_holes(mask: Mask, structure: Mask = INSIDE) -> Mask:
     border, by a structure."""
     outside = np.pad(~mask, 1, constant_values=True)
     number, _ = number_parts(outside, structure)
-    return (number != number[0, 0, 0])[1:-1, 1:-1, 1:-1]
+    at_border = number[0, 0, 0]
+    inner = (slice(1, -1),) * mask.ndim
+    return (number != at_border)[inner]
 
 
 def not_touching(mask: Mask, tissue: Mask) -> Mask:

@@ -10,6 +10,7 @@ from .triangles import (
     TriangleMesh,
     connected,
     dots,
+    half_edges,
     vertex_normals,
 )
 
@@ -53,8 +54,7 @@ def _patches(mesh: TriangleMesh, normals: Floats, size_mm: float) -> tuple[Ints,
     would change the topology, is divided by the next grid.
     """
     n_vertices = len(mesh.vertices)
-    ends = np.stack([mesh.faces, np.roll(mesh.faces, -1, axis=1)], axis=-1)
-    pairs = ends.reshape(-1, 2)
+    pairs = half_edges(mesh)
     # each edge once
     pairs = pairs[pairs[:, 0] < pairs[:, 1]]
     places = mesh.vertices - mesh.vertices.min(axis=0)
@@ -101,8 +101,9 @@ def _faces_between(faces: Ints, patch: Ints, inner_edges: Ints) -> tuple[Ints, M
     between = corners[n_inner_edges == 0]
     n_around = np.bincount(between.ravel(), minlength=n_patches)
     is_bad |= n_around < MIN_FACES
-    half_edges = between * n_patches + np.roll(between, -1, axis=1)
-    ordered = np.sort(half_edges.ravel())
+    # one number per half edge
+    numbers = between * n_patches + np.roll(between, -1, axis=1)
+    ordered = np.sort(numbers.ravel())
     repeated = ordered[1:][np.diff(ordered) == 0]
     for patches in np.divmod(repeated, n_patches):
         is_bad[patches] = True

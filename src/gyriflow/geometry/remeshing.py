@@ -5,7 +5,15 @@ import numpy as np
 import pymeshlab
 from scipy.spatial import cKDTree
 
-from .triangles import Floats, Mask, TriangleMesh, corners, edge_lengths, edges, submesh
+from .triangles import (
+    Floats,
+    Mask,
+    TriangleMesh,
+    corners,
+    edge_lengths,
+    half_edges,
+    submesh,
+)
 
 MIN_ROUNDS, FINE_ROUNDS, MAX_ROUNDS = 2, 5, 10
 """Rounds of remeshing: fewest, of a fine surface or a cap, and most."""
@@ -54,8 +62,7 @@ def self_intersecting_faces(mesh: TriangleMesh, among: Mask | None = None) -> Ma
 def made_even(mesh: TriangleMesh, edge_length_mm: float) -> TriangleMesh:
     """Return the surface with even triangles of an edge length (mm): remeshed, unless
     it is even, as surfaces from labels are."""
-    pairs, _ = edges(mesh)
-    lengths = edge_lengths(mesh.vertices, pairs) / edge_length_mm
+    lengths = _relative_lengths(mesh, edge_length_mm)
     shortest, longest = EVEN_LENGTHS
     is_kept = (lengths > shortest) & (lengths < longest)
     return mesh if is_kept.mean() >= EVEN_SHARE else remesh(mesh, edge_length_mm)
@@ -89,21 +96,27 @@ def remesh(
 
 def is_fine(mesh: TriangleMesh, edge_length_mm: float) -> bool:
     """Return whether a surface's edges are much shorter than a length (mm)."""
-    return bool(np.median(_side_lengths(mesh)) < FINE_SHARE * edge_length_mm)
+    return _are_short(_relative_lengths(mesh, edge_length_mm))
 
 
 def _rounds_for(mesh: TriangleMesh, edge_length_mm: float) -> int:
-    longest = _side_lengths(mesh).max() / edge_length_mm
-    least = FINE_ROUNDS if is_fine(mesh, edge_length_mm) else MIN_ROUNDS
+    """Return how many rounds of remeshing a surface needs."""
+    lengths = _relative_lengths(mesh, edge_length_mm)
+    least = FINE_ROUNDS if _are_short(lengths) else MIN_ROUNDS
+    _, longest_kept = EVEN_LENGTHS
+    too_long = max(lengths.max() / longest_kept, 1.0)
     # each round halves the edges that are too long
-    n_halvings = np.ceil(np.log2(max(longest / EVEN_LENGTHS[1], 1.0)))
-    return int(np.clip(n_halvings + 1, least, MAX_ROUNDS))
+    n_halvings = int(np.ceil(np.log2(too_long)))
+    return min(max(n_halvings + 1, least), MAX_ROUNDS)
 
 
-def _side_lengths(mesh: TriangleMesh) -> Floats:
-    """Return the (m, 3) lengths of the sides of faces."""
-    places = corners(mesh)
-    return np.linalg.norm(np.roll(places, -1, axis=1) - places, axis=2)
+def _are_short(lengths: Floats) -> bool:
+    return bool(np.median(lengths) < FINE_SHARE)
+
+
+def _relative_lengths(mesh: TriangleMesh, edge_length_mm: float) -> Floats:
+    """Return the (3 m,) lengths of the faces' edges as multiples of a length (mm)."""
+    return edge_lengths(mesh.vertices, half_edges(mesh)) / edge_length_mm
 
 
 def decimate(mesh: TriangleMesh, vertices: int) -> TriangleMesh:

@@ -209,7 +209,7 @@ def vertex_areas(mesh: TriangleMesh) -> Floats:
     return _sums_at_vertices(mesh, face_areas(mesh)) / 3.0
 
 
-def _half_edges(mesh: TriangleMesh) -> Ints:
+def half_edges(mesh: TriangleMesh) -> Ints:
     """Return the (3 m, 2) starts and ends of the edges of each face, in turn."""
     return mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
 
@@ -218,7 +218,7 @@ def edges(mesh: TriangleMesh) -> tuple[Ints, Ints]:
     """Return the (e, 2) undirected edges, each once and sorted, and the (e,) number of
     faces at each."""
     count = len(mesh.vertices)
-    pairs = np.sort(_half_edges(mesh), axis=1)
+    pairs = np.sort(half_edges(mesh), axis=1)
     # one number per edge: much faster than comparing rows
     numbers = pairs @ [count, 1]
     numbers, uses = np.unique(numbers, return_counts=True)
@@ -252,7 +252,7 @@ def is_closed(mesh: TriangleMesh) -> bool:
     directions."""
     if not len(mesh.faces):
         return False
-    start, end = _half_edges(mesh).T
+    start, end = half_edges(mesh).T
     count = len(mesh.vertices)
     is_forward, is_backward = start < end, start > end
     # one number per edge

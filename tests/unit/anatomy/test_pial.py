@@ -509,7 +509,7 @@ def test_a_piece_beside_a_hemisphere_is_left_out_with_its_place():
     (warning,) = [text for text in surface.report["warnings"] if facts == text]
     match = re.search(r"\((-?\d+), (-?\d+), (-?\d+)\) mm", warning)
     (expected,) = transform_points((place + CENTRE_MM)[None], to_file)
-    assert [int(part) for part in match.groups()] == pytest.approx(expected, abs=1.5)
+    assert [int(part) for part in match.groups()] == pytest.approx(expected, abs=1.0)
     assert surface.report["pieces"] == 2
     assert [len(pieces(side)) for side in (surface.left, surface.right)] == [1, 1]
     assert surface.whole.vertices[:, 0].min() > -45.0 + CENTRE_MM[0]
