@@ -55,15 +55,14 @@ BY_CORNERS, BY_FACES = (
         lambda offset: np.abs(offset).sum(),
     )
 )
-ENDS = (slice(None, -1), slice(1, None))
-"""Along an axis: all voxels that are the first of two neighbours, and the second."""
-SQUARE = (
-    (ENDS[0], ENDS[0]),
-    (ENDS[1], ENDS[0]),
-    (ENDS[1], ENDS[1]),
-    (ENDS[0], ENDS[1]),
-)
-"""The corners of a square of 2 × 2 voxels, one after the other around it."""
+SQUARES = [
+    [other + corner for corner in (0, one, one + two, two)]
+    for one, two, third in ((4, 2, 1), (4, 1, 2), (2, 1, 4))
+    for other in (0, third)
+]
+DIAGONALS = [[corner, 7 - corner] for corner in range(4)]
+"""The faces and the diagonals of a block of 2 × 2 × 2 voxels, whose voxels have the
+numbers 4 i + 2 j + k; faces in the order around them."""
 # bytes 0 and 1 as the digits of a binary number
 DIGITS = bytes.maketrans(b"\0\1", b"01")
 # radii in voxels of the openings and closings that find bridges and tunnels
@@ -173,17 +172,21 @@ def refine(
     # the first fine voxel's centre lies nearer to the first coarse voxel's corner
     to_corner = 0.5 * (1.0 - 1.0 / factor)
     fine[:3, 3] -= axes.sum(axis=1) * to_corner
-    for axis, length in enumerate(field.shape):
-        # the centres of fine voxels, in coarse ones
-        centres = (np.arange(factor * length) + 0.5) / factor - 0.5
-        centres = centres.clip(0, length - 1)
-        first = np.floor(centres).astype(int)
-        second = np.minimum(first + 1, length - 1)
-        along_axis = [1, 1, 1]
-        along_axis[axis] = -1
-        share = (centres - first).astype(field.dtype).reshape(along_axis)
-        before = field.take(first, axis)
-        field = before + share * (field.take(second, axis) - before)
+    for axis in range(3):
+        coarse = np.moveaxis(field, axis, 0)
+        padded = np.concatenate([coarse[:1], coarse, coarse[-1:]])
+        shape = list(field.shape)
+        shape[axis] *= factor
+        field = np.empty(shape, dtype=field.dtype)
+        refined = np.moveaxis(field, axis, 0)
+        for place in range(factor):
+            # from the centre of the coarse voxel to that of this fine one in it
+            offset = (place + 0.5) / factor - 0.5
+            first = 0 if offset < 0 else 1
+            before = padded[first : first + len(coarse)]
+            after = padded[first + 1 : first + 1 + len(coarse)]
+            share = field.dtype.type(offset % 1.0)
+            refined[place::factor] = before + share * (after - before)
     return field, fine
 
 
@@ -344,46 +347,39 @@ def unambiguous(field: NDArray[np.float32]) -> NDArray[np.float32]:
     cube differ from the other six, marching cubes decides from the values; these are
     changed so that it never connects the inside.
     """
-    mask = field > 0.5
-    ambiguous = np.zeros_like(mask)
-    for first, second in ((0, 1), (0, 2), (1, 2)):
-        inside = np.moveaxis(
-            mask,
-            (first, second),
-            (0, 1),
-        )
-        flags = np.moveaxis(
-            ambiguous,
-            (first, second),
-            (0, 1),
-        )
-        # around each square in turn
-        a, b, c, d = (inside[place] for place in SQUARE)
+    mask = field > LEVEL
+    blocks = _mixed_blocks(mask)
+    inside = mask.ravel()[blocks]
+    is_ambiguous = np.zeros_like(inside)
+    for square in SQUARES:
+        a, b, c, d = inside[:, square].T
         alternating = (a == c) & (b == d) & (a != b)
-        for place in SQUARE:
-            flags[place] |= alternating
-    corners = list(product(ENDS, repeat=3))
-    count = np.zeros(
-        mask[corners[0]].shape,
-        dtype=np.int8,
-    )
-    for corner in corners:
-        count += mask[corner]
-    for corner, opposite in zip(
-        corners[:4],
-        reversed(corners[4:]),
-        strict=True,
-    ):
-        one = mask[corner]
-        other = mask[opposite]
-        only_inside = one & other & (count == 2)
-        only_outside = ~one & ~other & (count == 6)
-        both_differ = only_inside | only_outside
-        for cube_corner in corners:
-            ambiguous[cube_corner] |= both_differ
-    limit = np.where(mask, 0.55, 0.05)
-    separated = np.minimum(field, limit)
-    return np.where(ambiguous, separated, field).astype(np.float32)
+        is_ambiguous[:, square] |= alternating[:, None]
+    n_inside = inside.sum(axis=1)
+    for diagonal in DIAGONALS:
+        one, other = inside[:, diagonal].T
+        only_both_differ = (one == other) & (n_inside == np.where(one, 2, 6))
+        is_ambiguous |= only_both_differ[:, None]
+    voxels = np.unravel_index(blocks[is_ambiguous], mask.shape)
+    limit = np.where(mask[voxels], 0.55, 0.05)
+    separated = field.astype(np.float32)
+    separated[voxels] = np.minimum(field[voxels], limit)
+    return separated
+
+
+def _mixed_blocks(mask: Mask) -> NDArray[np.int64]:
+    """Return the (n, 8) flat indices of the voxels of each block of 2 × 2 × 2 voxels
+    that has some in the mask and others outside."""
+    any_inside = all_inside = mask
+    for axis in range(3):
+        low, high = (
+            (slice(None),) * axis + (end,) for end in (slice(None, -1), slice(1, None))
+        )
+        any_inside = any_inside[low] | any_inside[high]
+        all_inside = all_inside[low] & all_inside[high]
+    first = np.nonzero(any_inside & ~all_inside)
+    offsets = np.ravel_multi_index(np.indices((2, 2, 2)).reshape(3, 8), mask.shape)
+    return np.ravel_multi_index(first, mask.shape)[:, None] + offsets
 
 
 def dilated(mask: Mask, radius: float, size: Floats | None = None) -> Mask:
@@ -555,9 +551,8 @@ def _euler_cells(mask: Mask) -> NDArray[np.int8]:
 def _pairs(mask: Mask, axis: int) -> Mask:
     """Return which voxels of a mask have a next one along an axis in it, too."""
     voxels = np.moveaxis(mask, axis, 0)
-    is_first, is_second = ENDS
     both = np.zeros_like(voxels)
-    both[is_first] = voxels[is_first] & voxels[is_second]
+    both[:-1] = voxels[:-1] & voxels[1:]
     return np.moveaxis(both, 0, axis)
 
 

@@ -36,7 +36,7 @@ def contract(mesh: TriangleMesh, size_mm: float) -> TriangleMesh:
     normals = vertex_normals(mesh)
     patch, faces = _patches(mesh, normals, size_mm)
     sizes = np.bincount(patch)
-    centres = _sums(patch, mesh.vertices) / sizes[:, None]
+    centres = _sums(patch, mesh.vertices, len(sizes)) / sizes[:, None]
     distances = np.linalg.norm(mesh.vertices - centres[patch], axis=1)
     by_patch = np.lexsort((distances, patch))
     middle = by_patch[np.cumsum(sizes) - sizes]
@@ -54,11 +54,15 @@ def _patches(mesh: TriangleMesh, normals: Floats, size_mm: float) -> tuple[Ints,
     would change the topology, is divided by the next grid.
     """
     n_vertices = len(mesh.vertices)
-    pairs = half_edges(mesh)
-    # each edge once
-    pairs = pairs[pairs[:, 0] < pairs[:, 1]]
+    first, second = half_edges(mesh).T
+    is_once = first < second
+    # (2, k) and (3, m), since NumPy is slow along short rows
+    ends = np.stack([first[is_once], second[is_once]])
+    corners = np.ascontiguousarray(mesh.faces.T)
     places = mesh.vertices - mesh.vertices.min(axis=0)
     cell = np.zeros(n_vertices, dtype=np.int64)
+    # a patch has the number of its first vertex
+    patch = np.zeros(n_vertices, dtype=np.int64)
     needs_division = np.ones(n_vertices, dtype=bool)
     for grid in range(N_GRIDS):
         place = np.floor(places[needs_division] / size_mm + GRID_SHIFT * grid)
@@ -66,51 +70,86 @@ def _patches(mesh: TriangleMesh, normals: Floats, size_mm: float) -> tuple[Ints,
         cell[needs_division] = number + grid * MAX_CELLS**3
         size_mm *= GRID_RATIO
 
-        first, second = cell[pairs].T
-        inner_edges = pairs[first == second]
-        patch = connected(inner_edges, n_vertices).astype(np.int64)
-        faces, is_bad = _faces_between(mesh.faces, patch, inner_edges)
-        lengths = np.linalg.norm(_sums(patch, normals), axis=1)
-        sizes = np.bincount(patch)
+        linked = ends[:, needs_division[ends].all(axis=0)]
+        linked = linked[:, np.equal(*cell[linked])]
+        patch[needs_division] = _first_connected(linked, n_vertices)[needs_division]
+
+        # a division changes the new patches and those beside them
+        divided = corners[:, needs_division[corners].any(axis=0)]
+        is_changed = np.zeros(n_vertices, dtype=bool)
+        is_changed[patch[divided]] = True
+        is_near = is_changed[patch]
+        is_bad = _changes_topology(
+            patch,
+            ends[:, is_near[ends].all(axis=0)],
+            corners[:, is_near[corners].any(axis=0)],
+        )
+        sizes = np.bincount(patch, minlength=n_vertices)
+        lengths = np.linalg.norm(_sums(patch, normals, n_vertices), axis=1)
         is_bad |= lengths < MIN_MEAN_NORMAL * sizes
         # a single vertex cannot be divided
-        is_bad &= sizes > 1
+        is_bad &= is_changed & (sizes > 1)
         if not is_bad.any():
-            return patch, faces
+            return _numbered(patch, corners)
         needs_division = is_bad[patch]
     return np.arange(n_vertices), mesh.faces
 
 
-def _faces_between(faces: Ints, patch: Ints, inner_edges: Ints) -> tuple[Ints, Mask]:
-    """Return the faces between patches, and the mask of the patches that would change
-    the topology.
+def _first_connected(ends: Ints, count: int) -> Ints:
+    """Return the first of the nodes that each of `count` nodes is connected with, by
+    links between the nodes `ends` (2, k)."""
+    component = connected(ends.T, count)
+    first = np.empty(component.max() + 1, dtype=np.int64)
+    nodes = np.arange(count)
+    # the last assignment stays
+    first[component[::-1]] = nodes[::-1]
+    return first[component]
 
-    `inner_edges` (k, 2) are those within patches. The topology stays the same if each
-    patch is a disk (connected, Euler number 1) with three faces or more around it, and
-    two patches share at most one edge.
+
+def _changes_topology(patch: Ints, ends: Ints, corners: Ints) -> Mask:
+    """Return the (n,) mask of the patches, by their numbers, that would change the
+    topology.
+
+    Of the patches that are asked for, all edges are in `ends` (2, k), all faces in
+    `corners` (3, m). The topology stays the same if each patch is a disk (connected,
+    Euler number 1) with three faces or more around it, and two patches share at most
+    one edge.
     """
-    n_patches = int(patch.max()) + 1
-    corners = patch[faces]
-    n_inner_edges = (corners == np.roll(corners, -1, axis=1)).sum(axis=1)
-    inner_faces = corners[n_inner_edges == 3, 0]
-    n_vertices = np.bincount(patch)
-    n_edges = np.bincount(patch[inner_edges[:, 0]], minlength=n_patches)
-    n_faces = np.bincount(inner_faces, minlength=n_patches)
+    count = len(patch)
+    first, second = patch[ends]
+    at_corners = patch[corners]
+    at_next = np.roll(at_corners, -1, axis=0)
+    n_inner_edges = (at_corners == at_next).sum(axis=0)
+    n_vertices = np.bincount(patch, minlength=count)
+    n_edges = np.bincount(first[first == second], minlength=count)
+    n_faces = np.bincount(at_corners[0, n_inner_edges == 3], minlength=count)
     is_bad = n_vertices - n_edges + n_faces != 1
 
-    between = corners[n_inner_edges == 0]
-    n_around = np.bincount(between.ravel(), minlength=n_patches)
+    is_between = n_inner_edges == 0
+    between = at_corners[:, is_between]
+    n_around = np.bincount(between.ravel(), minlength=count)
     is_bad |= n_around < MIN_FACES
     # one number per half edge
-    numbers = between * n_patches + np.roll(between, -1, axis=1)
+    numbers = between * count + at_next[:, is_between]
     ordered = np.sort(numbers.ravel())
     repeated = ordered[1:][np.diff(ordered) == 0]
-    for patches in np.divmod(repeated, n_patches):
+    for patches in np.divmod(repeated, count):
         is_bad[patches] = True
-    return between, is_bad
+    return is_bad
 
 
-def _sums(patch: Ints, vectors: Floats) -> Floats:
-    """Return the sum of the (n, 3) vectors of each patch, from the patch (n,) of
-    each."""
-    return np.stack([np.bincount(patch, values) for values in vectors.T], axis=1)
+def _numbered(patch: Ints, corners: Ints) -> tuple[Ints, Ints]:
+    """Number patches from 0 in the order of their first vertices; return the patch (n,)
+    of each vertex, and the (m, 3) faces between patches."""
+    is_first = patch == np.arange(len(patch))
+    patch = (np.cumsum(is_first) - 1)[patch]
+    at_corners = patch[corners]
+    is_between = (at_corners != np.roll(at_corners, -1, axis=0)).all(axis=0)
+    return patch, at_corners[:, is_between].T
+
+
+def _sums(patch: Ints, vectors: Floats, count: int) -> Floats:
+    """Return the sum of the (n, 3) vectors of each of `count` patches, from the patch
+    (n,) of each."""
+    sums = [np.bincount(patch, values, count) for values in vectors.T]
+    return np.stack(sums, axis=1)

@@ -1,19 +1,12 @@
 """Remeshing of surfaces with even triangles, and removal of self-intersections, by
 MeshLab's filters."""
 
+import igl
 import numpy as np
 import pymeshlab
 from scipy.spatial import cKDTree
 
-from .triangles import (
-    Floats,
-    Mask,
-    TriangleMesh,
-    corners,
-    edge_lengths,
-    half_edges,
-    submesh,
-)
+from .triangles import Floats, Mask, TriangleMesh, corners, submesh
 
 MIN_ROUNDS, FINE_ROUNDS, MAX_ROUNDS = 2, 5, 10
 """Rounds of remeshing: fewest, of a fine surface or a cap, and most."""
@@ -115,8 +108,8 @@ def _are_short(lengths: Floats) -> bool:
 
 
 def _relative_lengths(mesh: TriangleMesh, edge_length_mm: float) -> Floats:
-    """Return the (3 m,) lengths of the faces' edges as multiples of a length (mm)."""
-    return edge_lengths(mesh.vertices, half_edges(mesh)) / edge_length_mm
+    """Return the (m, 3) lengths of the faces' edges as multiples of a length (mm)."""
+    return np.asarray(igl.edge_lengths(mesh.vertices, mesh.faces)) / edge_length_mm
 
 
 def decimate(mesh: TriangleMesh, vertices: int) -> TriangleMesh:
