@@ -185,8 +185,10 @@ def refine(
             first = 0 if offset < 0 else 1
             before = padded[first : first + len(coarse)]
             after = padded[first + 1 : first + 1 + len(coarse)]
-            share = field.dtype.type(offset % 1.0)
-            refined[place::factor] = before + share * (after - before)
+            values = after - before
+            values *= offset % 1.0
+            values += before
+            refined[place::factor] = values
     return field, fine
 
 
