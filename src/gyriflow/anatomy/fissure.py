@@ -25,7 +25,14 @@ from ..geometry.matching import nearest_on
 from ..geometry.triangles import Ints, TriangleMesh
 from ..geometry.voxels import OUTSIDE, distance_to, number_parts
 from ..settings.terms import Side
-from .extraction import EDGE_SLOPE, SMOOTHING_VOXELS, Floats, Mask, dilated
+from .extraction import (
+    EDGE_SLOPE,
+    SMOOTHING_VOXELS,
+    Floats,
+    Mask,
+    dilated,
+    with_neighbours,
+)
 
 SAMPLES = 600
 DIRECTIONS = 400
@@ -618,7 +625,7 @@ def hidden_fissure(
         hidden |= (number > 0) & (sizes_mm2 <= MAX_BRIDGE_MM2)[number]
     is_right = side_mm > 0
     touching = [
-        ndimage.binary_dilation(core & part) & core & ~part
+        with_neighbours(core & part) & core & ~part
         for part in (is_right, ~is_right)
     ]
     number, _ = number_parts(

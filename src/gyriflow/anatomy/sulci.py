@@ -19,7 +19,7 @@ from scipy.spatial import cKDTree
 
 from ..geometry.boxes import Box
 from ..geometry.deformations import transform_points, voxel_size
-from ..geometry.voxels import INSIDE, OUTSIDE, distance_to, number_parts
+from ..geometry.voxels import OUTSIDE, distance_to, number_parts
 from ..units import ML_PER_MM3
 from .extraction import (
     LEVEL,
@@ -29,6 +29,7 @@ from .extraction import (
     main_parts,
     refine,
     shifted_affine,
+    with_neighbours,
 )
 from .fissure import sample
 
@@ -109,7 +110,7 @@ def open_fused_sulci(
         (nearest[:, cortex].T - places) * size,
         axis=1,
     )
-    at_surface = ndimage.binary_dilation(~inside, INSIDE)
+    at_surface = with_neighbours(~inside)
     surface = at_surface[cortex]
     if (
         far := float((depth_mm > FAR * np.quantile(depth_mm[surface], 0.25)).mean())

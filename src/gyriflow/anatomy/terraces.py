@@ -4,6 +4,7 @@ allow."""
 from collections.abc import Sequence
 from functools import partial
 
+import igl
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
@@ -16,7 +17,6 @@ from ..geometry.remeshing import self_intersecting_faces
 from ..geometry.triangles import (
     Floats,
     TriangleMesh,
-    corners,
     face_areas,
     face_normals,
     submesh,
@@ -153,14 +153,7 @@ def _degraded(before: TriangleMesh, after: TriangleMesh) -> NDArray[np.bool_]:
     )
     shapes = [
         face_areas(mesh)
-        / (
-            np.diff(
-                corners(mesh),
-                axis=1,
-                append=corners(mesh)[:, :1],
-            )
-            ** 2
-        ).sum(axis=(1, 2))
+        / igl.squared_edge_lengths(mesh.vertices, mesh.faces).sum(axis=1)
         for mesh in (before, after)
     ]
     return turned | (shapes[1] < MIN_SHAPE_RATIO * shapes[0])
