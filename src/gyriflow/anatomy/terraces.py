@@ -41,7 +41,7 @@ GAUSSIAN_VOXELS2, ROUGHNESS_SHARE = 0.35, 0.14
 SYMMETRIC = {"SymmetricMode": True}
 # how often vertices of faces that cross others, rotate by 60° or become needles are
 # reset, with their neighbours
-N_RESETS = 8
+N_RESETS = 12
 MIN_COSINE, MIN_SHAPE_RATIO = 0.5, 0.75
 
 
@@ -114,19 +114,25 @@ def without_terraces(
         ),
     )
     changed = np.ones(len(mesh.faces), dtype=bool)
+    unsearched = changed.copy()
     for _ in range(N_RESETS):
         moved = TriangleMesh(start + moves, mesh.faces)
-        bad = self_intersecting_faces(moved, changed)
-        bad[changed] |= _degraded(
+        bad = np.zeros_like(changed)
+        bad[changed] = _degraded(
             submesh(mesh, changed)[0],
             submesh(moved, changed)[0],
         )
+        if not bad.any():
+            # crossings are searched last, as this takes longest
+            bad = self_intersecting_faces(moved, unsearched)
+            unsearched[:] = False
         if not bad.any():
             return moved
         near = np.isin(mesh.faces, mesh.faces[bad]).any(axis=1)
         moves[mesh.faces[near]] = 0.0
         # others have not changed since they were examined
         changed = np.isin(mesh.faces, mesh.faces[near]).any(axis=1)
+        unsearched |= changed
     return mesh
 
 
