@@ -625,8 +625,7 @@ def hidden_fissure(
         hidden |= (number > 0) & (sizes_mm2 <= MAX_BRIDGE_MM2)[number]
     is_right = side_mm > 0
     touching = [
-        with_neighbours(core & part) & core & ~part
-        for part in (is_right, ~is_right)
+        with_neighbours(core & part) & core & ~part for part in (is_right, ~is_right)
     ]
     number, _ = number_parts(
         touching[0] | touching[1],
