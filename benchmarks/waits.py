@@ -4,12 +4,12 @@
     ./run python benchmarks/waits.py CONFIG --before ../before --out FOLDER \\
         [--command measure] [--stage STAGE] [--cores 1] [--repeats 5]
 
-CONFIG is a configuration, for example of one brain from labels; one in this checkout
-stands for that of each checkout. `--command` is `measure`, `run`, `check` or `init`,
-which needs the folder of the scans instead. Both checkouts run it in new folders in
-FOLDER, up to the STAGE or the file of this name if there is one: on one core each at
-the same time, so that they have the same load (the faster one runs once more meanwhile,
-which is not counted), and on several cores in turn.
+CONFIG is a configuration, for example of one brain from labels; of one in this
+checkout, each checkout takes its own. `--command` is `measure`, `run`, `check` or
+`init`, which needs the folder of the scans instead. Both checkouts run it in new
+folders in FOLDER, up to the STAGE or the file of this name if there is one: on one core
+each at the same time, so that they have the same load (the faster one runs again
+meanwhile, which is not counted), and on several cores in turn.
 
 The first table has, for each kind of step and run, processor time as its steps have
 recorded it, with child processes (s; median, smallest and largest of the repeats), and
@@ -151,16 +151,22 @@ def take_times_together(
     for checkout, folder in folders.items():
         process = start(command, checkout, folder)
         running[process.pid] = checkout, process
-    ended, status, usage = os.wait4(-1, 0)
-    first, process = running.pop(ended)
-    times = {first: {"whole": time_of(process, status, usage)}}
-    spare = folders[first].with_name("load")
-    make_anew(spare)
-    load = start(command, first, spare)
-    ((second, process),) = running.values()
-    times[second] = {"whole": wait_for(process)}
-    load.terminate()
-    load.wait()
+    times: dict[Path, dict[str, float]] = {}
+    try:
+        while len(times) < len(folders):
+            ended, status, usage = os.wait4(-1, 0)
+            checkout, process = running.pop(ended)
+            seconds = time_of(process, status, usage)
+            times.setdefault(checkout, {"whole": seconds})
+            if len(times) < len(folders):
+                spare = folders[checkout].with_name("load")
+                make_anew(spare)
+                process = start(command, checkout, spare)
+                running[process.pid] = checkout, process
+    finally:
+        for _, process in running.values():
+            process.terminate()
+            process.wait()
     return times
 
 

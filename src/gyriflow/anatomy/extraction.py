@@ -55,14 +55,17 @@ BY_CORNERS, BY_FACES = (
         lambda offset: np.abs(offset).sum(),
     )
 )
+# voxel (i, j, k) of a block of 2 × 2 × 2 has the number 4 i + 2 j + k; these are the
+# corners of its six faces, in the order around each, and its pairs of opposite corners
 SQUARES = [
-    [other + corner for corner in (0, one, one + two, two)]
-    for one, two, third in ((4, 2, 1), (4, 1, 2), (2, 1, 4))
-    for other in (0, third)
+    [0, 4, 6, 2],
+    [1, 5, 7, 3],
+    [0, 4, 5, 1],
+    [2, 6, 7, 3],
+    [0, 2, 3, 1],
+    [4, 6, 7, 5],
 ]
-DIAGONALS = [[corner, 7 - corner] for corner in range(4)]
-"""The faces and the diagonals of a block of 2 × 2 × 2 voxels, whose voxels have the
-numbers 4 i + 2 j + k; faces in the order around them."""
+DIAGONALS = [[0, 7], [1, 6], [2, 5], [3, 4]]
 # bytes 0 and 1 as the digits of a binary number
 DIGITS = bytes.maketrans(b"\0\1", b"01")
 # radii in voxels of the openings and closings that find bridges and tunnels
@@ -144,7 +147,8 @@ def remove_bridges(
     number, _ = number_parts(~mask)
     # the volume is padded, so its first voxel is outside
     closed = (number == number[0, 0, 0]) & (field > LEVEL)
-    number, gains = _parts_with_gains(field > LEVEL, closed)
+    inside = field > LEVEL
+    number, gains = _parts_with_gains(inside, _euler_cells(inside), closed)
     opened = (
         np.bincount(
             number[closed],
@@ -174,21 +178,22 @@ def refine(
     fine[:3, 3] -= axes.sum(axis=1) * to_corner
     for axis in range(3):
         coarse = np.moveaxis(field, axis, 0)
+        # beyond the outer centres the field is constant
         padded = np.concatenate([coarse[:1], coarse, coarse[-1:]])
         shape = list(field.shape)
         shape[axis] *= factor
         field = np.empty(shape, dtype=field.dtype)
         refined = np.moveaxis(field, axis, 0)
-        for place in range(factor):
-            # from the centre of the coarse voxel to that of this fine one in it
-            offset = (place + 0.5) / factor - 0.5
-            first = 0 if offset < 0 else 1
-            before = padded[first : first + len(coarse)]
-            after = padded[first + 1 : first + 1 + len(coarse)]
+        for step in range(factor):
+            # from the centre of a coarse voxel to that of a fine one in it
+            offset = (step + 0.5) / factor - 0.5
+            start = 0 if offset < 0 else 1
+            before = padded[start : start + len(coarse)]
+            after = padded[start + 1 : start + 1 + len(coarse)]
             values = after - before
             values *= offset % 1.0
             values += before
-            refined[place::factor] = values
+            refined[step::factor] = values
     return field, fine
 
 
@@ -359,9 +364,9 @@ def unambiguous(field: NDArray[np.float32]) -> NDArray[np.float32]:
         is_ambiguous[:, square] |= alternating[:, None]
     n_inside = inside.sum(axis=1)
     for diagonal in DIAGONALS:
-        one, other = inside[:, diagonal].T
-        only_both_differ = (one == other) & (n_inside == np.where(one, 2, 6))
-        is_ambiguous |= only_both_differ[:, None]
+        corner, opposite = inside[:, diagonal].T
+        others_differ = n_inside == np.where(corner, 2, 6)
+        is_ambiguous |= ((corner == opposite) & others_differ)[:, None]
     voxels = np.unravel_index(blocks[is_ambiguous], mask.shape)
     limit = np.where(mask[voxels], 0.55, 0.05)
     separated = field.astype(np.float32)
@@ -371,12 +376,12 @@ def unambiguous(field: NDArray[np.float32]) -> NDArray[np.float32]:
 
 def _mixed_blocks(mask: Mask) -> NDArray[np.int64]:
     """Return the (n, 8) flat indices of the voxels of each block of 2 × 2 × 2 voxels
-    that has some in the mask and others outside."""
+    with some in the mask and others outside."""
     any_inside = all_inside = mask
     for axis in range(3):
-        low, high = (
-            (slice(None),) * axis + (end,) for end in (slice(None, -1), slice(1, None))
-        )
+        before = (slice(None),) * axis
+        low = (*before, slice(None, -1))
+        high = (*before, slice(1, None))
         any_inside = any_inside[low] | any_inside[high]
         all_inside = all_inside[low] & all_inside[high]
     first = np.nonzero(any_inside & ~all_inside)
@@ -476,9 +481,10 @@ def _patches(
     grown = dilated(np.pad(mask, margin), radius)
     closed = ~dilated(~grown, radius)[inner]
     opened = dilated(~dilated(~mask, radius), radius)
+    cells = _euler_cells(mask)
     patches = []
     for fills, change in ((True, closed & ~mask), (False, mask & ~opened)):
-        number, gains = _parts_with_gains(mask, change)
+        number, gains = _parts_with_gains(mask, cells, change)
         for box, patch in parts_in_boxes(change & (gains > 0)[number]):
             needed = np.abs(field[box][patch] - LEVEL).sum(dtype=float)
             size = int(patch.sum()), round(float(needed), FIELD_DECIMALS)
@@ -563,12 +569,12 @@ def _euler_number(mask: Mask) -> int:
 
 
 def _parts_with_gains(
-    mask: Mask, change: Mask
+    mask: Mask, cells: NDArray[np.int8], change: Mask
 ) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
-    """Label the parts of a `change` of the mask; return the labels, and by label the
-    change of the Euler number."""
+    """Label the parts of a `change` of the mask, whose `_euler_cells` are given; return
+    the labels, and by label the change of the Euler number."""
     number, count = number_parts(change, OUTSIDE)
-    gain = _euler_cells(mask ^ change) - _euler_cells(mask)
+    gain = _euler_cells(mask ^ change) - cells
     places = np.argwhere(gain)
     last = np.array(mask.shape) - 1
     # a block's gain belongs to the part that has one of its voxels

@@ -211,17 +211,18 @@ def _middles(
     opposite: Ints,
     normal: Floats,
 ) -> Floats:
-    across = np.outer(height, normal)
-    in_plane = vertices - across
-    # distances along the plane count five times as much as distances across it
-    squeezed = in_plane + 0.2 * across
-    _, nearest = cKDTree(squeezed[opposite]).query(
-        squeezed[wall], k=min(8, len(opposite))
-    )
+    in_plane, squeezed = [], []
+    for side in (wall, opposite):
+        across = np.outer(height[side], normal)
+        in_plane.append(vertices[side] - across)
+        # distances along the plane count five times as much as distances across it
+        squeezed.append(in_plane[-1] + 0.2 * across)
+    tree = cKDTree(squeezed[1])
+    _, nearest = tree.query(squeezed[0], k=min(8, len(opposite)))
     neighbours = opposite[nearest]
     gap = height[neighbours] - height[wall][:, None]
     offset_mm = np.linalg.norm(
-        in_plane[neighbours] - in_plane[wall][:, None],
+        in_plane[1][nearest] - in_plane[0][:, None],
         axis=-1,
     )
     gap = np.where(

@@ -149,12 +149,10 @@ def open_fused_sulci(
     if not count:
         return field, affine, {"sheets": 0, "slit_voxels": 0, "opened_mL": 0.0}
     slit = _grow_slits(inside, sheets, cortex, distance)
-    opened = np.where(
-        slit,
-        np.minimum(whole, np.float32(SLIT_VALUE)),
-        whole,
-    )
-    taken = float((whole - opened).sum(dtype=float) * size.prod() * ML_PER_MM3)
+    opened = whole.copy()
+    opened[slit] = np.minimum(whole[slit], np.float32(SLIT_VALUE))
+    lost = (whole[slit] - opened[slit]).sum(dtype=float)
+    taken = float(lost * size.prod() * ML_PER_MM3)
     return (
         opened,
         fine,

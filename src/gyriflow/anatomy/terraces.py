@@ -39,9 +39,9 @@ GAUSSIAN_VOXELS2, ROUGHNESS_SHARE = 0.35, 0.14
 # pivots on the diagonal keep the factors sparse: 60 times faster. Larger panels and
 # relaxed supernodes, which help denser matrices, would take a third longer
 SYMMETRIC = {"SymmetricMode": True}
-# how often vertices of faces that cross others, rotate by 60° or become needles are
-# reset, with their neighbours
-N_RESETS = 12
+# vertices of faces that cross others, rotate by 60° or become needles are reset, with
+# their neighbours, after all checks but the last
+N_CHECKS = 16
 MIN_COSINE, MIN_SHAPE_RATIO = 0.5, 0.75
 
 
@@ -113,26 +113,26 @@ def without_terraces(
             1e-9,
         ),
     )
-    changed = np.ones(len(mesh.faces), dtype=bool)
-    unsearched = changed.copy()
-    for _ in range(N_RESETS):
+    is_changed = np.ones(len(mesh.faces), dtype=bool)
+    needs_search = is_changed.copy()
+    for _ in range(N_CHECKS):
         moved = TriangleMesh(start + moves, mesh.faces)
-        bad = np.zeros_like(changed)
-        bad[changed] = _degraded(
-            submesh(mesh, changed)[0],
-            submesh(moved, changed)[0],
+        is_bad = np.zeros_like(is_changed)
+        is_bad[is_changed] = _degraded(
+            submesh(mesh, is_changed)[0],
+            submesh(moved, is_changed)[0],
         )
-        if not bad.any():
-            # crossings are searched last, as this takes longest
-            bad = self_intersecting_faces(moved, unsearched)
-            unsearched[:] = False
-        if not bad.any():
+        if not is_bad.any():
+            # the search for crossings takes longest, so it comes last
+            is_bad = self_intersecting_faces(moved, needs_search)
+            needs_search[:] = False
+        if not is_bad.any():
             return moved
-        near = np.isin(mesh.faces, mesh.faces[bad]).any(axis=1)
-        moves[mesh.faces[near]] = 0.0
-        # others have not changed since they were examined
-        changed = np.isin(mesh.faces, mesh.faces[near]).any(axis=1)
-        unsearched |= changed
+        is_near = np.isin(mesh.faces, mesh.faces[is_bad]).any(axis=1)
+        moves[mesh.faces[is_near]] = 0.0
+        # all other faces are as they were when they were checked
+        is_changed = np.isin(mesh.faces, mesh.faces[is_near]).any(axis=1)
+        needs_search |= is_changed
     return mesh
 
 

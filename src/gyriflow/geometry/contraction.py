@@ -54,35 +54,37 @@ def _patches(mesh: TriangleMesh, normals: Floats, size_mm: float) -> tuple[Ints,
     would change the topology, is divided by the next grid.
     """
     n_vertices = len(mesh.vertices)
-    first, second = half_edges(mesh).T
-    is_once = first < second
-    # (2, k) and (3, m), since NumPy is slow along short rows
-    ends = np.stack([first[is_once], second[is_once]])
-    corners = np.ascontiguousarray(mesh.faces.T)
+    start, end = half_edges(mesh).T
+    is_forward = start < end
+    # (2, k), each edge once, and (3, m), since NumPy is slow along short rows
+    edge_ends = np.stack([start[is_forward], end[is_forward]])
+    face_vertices = np.ascontiguousarray(mesh.faces.T)
     places = mesh.vertices - mesh.vertices.min(axis=0)
     cell = np.zeros(n_vertices, dtype=np.int64)
     # a patch has the number of its first vertex
     patch = np.zeros(n_vertices, dtype=np.int64)
     needs_division = np.ones(n_vertices, dtype=bool)
     for grid in range(N_GRIDS):
-        place = np.floor(places[needs_division] / size_mm + GRID_SHIFT * grid)
-        number = place @ [MAX_CELLS**2, MAX_CELLS, 1]
+        indices = np.floor(places[needs_division] / size_mm + GRID_SHIFT * grid)
+        number = indices @ [MAX_CELLS**2, MAX_CELLS, 1]
         cell[needs_division] = number + grid * MAX_CELLS**3
         size_mm *= GRID_RATIO
 
-        linked = ends[:, needs_division[ends].all(axis=0)]
-        linked = linked[:, np.equal(*cell[linked])]
+        divided_edges = edge_ends[:, needs_division[edge_ends].all(axis=0)]
+        start_cell, end_cell = cell[divided_edges]
+        linked = divided_edges[:, start_cell == end_cell]
         patch[needs_division] = _first_connected(linked, n_vertices)[needs_division]
 
-        # a division changes the new patches and those beside them
-        divided = corners[:, needs_division[corners].any(axis=0)]
+        # only new patches and those beside them have to be looked at: the others have
+        # not changed since they were
+        divided_faces = face_vertices[:, needs_division[face_vertices].any(axis=0)]
         is_changed = np.zeros(n_vertices, dtype=bool)
-        is_changed[patch[divided]] = True
+        is_changed[patch[divided_faces]] = True
         is_near = is_changed[patch]
         is_bad = _changes_topology(
             patch,
-            ends[:, is_near[ends].all(axis=0)],
-            corners[:, is_near[corners].any(axis=0)],
+            edge_ends[:, is_near[edge_ends].all(axis=0)],
+            face_vertices[:, is_near[face_vertices].any(axis=0)],
         )
         sizes = np.bincount(patch, minlength=n_vertices)
         lengths = np.linalg.norm(_sums(patch, normals, n_vertices), axis=1)
@@ -90,47 +92,46 @@ def _patches(mesh: TriangleMesh, normals: Floats, size_mm: float) -> tuple[Ints,
         # a single vertex cannot be divided
         is_bad &= is_changed & (sizes > 1)
         if not is_bad.any():
-            return _numbered(patch, corners)
+            return _renumber(patch, face_vertices)
         needs_division = is_bad[patch]
     return np.arange(n_vertices), mesh.faces
 
 
-def _first_connected(ends: Ints, count: int) -> Ints:
-    """Return the first of the nodes that each of `count` nodes is connected with, by
-    links between the nodes `ends` (2, k)."""
-    component = connected(ends.T, count)
+def _first_connected(edge_ends: Ints, count: int) -> Ints:
+    """Return for each of `count` vertices the first one that it is connected with, by
+    edges between the vertices `edge_ends` (2, k)."""
+    component = connected(edge_ends.T, count)
     first = np.empty(component.max() + 1, dtype=np.int64)
-    nodes = np.arange(count)
-    # the last assignment stays
-    first[component[::-1]] = nodes[::-1]
+    # where indices repeat, NumPy keeps the last value
+    first[component[::-1]] = np.arange(count)[::-1]
     return first[component]
 
 
-def _changes_topology(patch: Ints, ends: Ints, corners: Ints) -> Mask:
+def _changes_topology(patch: Ints, edge_ends: Ints, face_vertices: Ints) -> Mask:
     """Return the (n,) mask of the patches, by their numbers, that would change the
     topology.
 
-    Of the patches that are asked for, all edges are in `ends` (2, k), all faces in
-    `corners` (3, m). The topology stays the same if each patch is a disk (connected,
-    Euler number 1) with three faces or more around it, and two patches share at most
-    one edge.
+    It holds for patches whose edges are all in `edge_ends` (2, k), and all faces at
+    their vertices in `face_vertices` (3, m). The topology stays the same if each patch
+    is a disk (connected, Euler number 1) with three faces or more around it, and two
+    patches share at most one edge.
     """
     count = len(patch)
-    first, second = patch[ends]
-    at_corners = patch[corners]
-    at_next = np.roll(at_corners, -1, axis=0)
-    n_inner_edges = (at_corners == at_next).sum(axis=0)
+    start, end = patch[edge_ends]
+    corner = patch[face_vertices]
+    next_corner = np.roll(corner, -1, axis=0)
+    n_inner_edges = (corner == next_corner).sum(axis=0)
     n_vertices = np.bincount(patch, minlength=count)
-    n_edges = np.bincount(first[first == second], minlength=count)
-    n_faces = np.bincount(at_corners[0, n_inner_edges == 3], minlength=count)
+    n_edges = np.bincount(start[start == end], minlength=count)
+    n_faces = np.bincount(corner[0, n_inner_edges == 3], minlength=count)
     is_bad = n_vertices - n_edges + n_faces != 1
 
     is_between = n_inner_edges == 0
-    between = at_corners[:, is_between]
+    between = corner[:, is_between]
     n_around = np.bincount(between.ravel(), minlength=count)
     is_bad |= n_around < MIN_FACES
     # one number per half edge
-    numbers = between * count + at_next[:, is_between]
+    numbers = between * count + next_corner[:, is_between]
     ordered = np.sort(numbers.ravel())
     repeated = ordered[1:][np.diff(ordered) == 0]
     for patches in np.divmod(repeated, count):
@@ -138,14 +139,15 @@ def _changes_topology(patch: Ints, ends: Ints, corners: Ints) -> Mask:
     return is_bad
 
 
-def _numbered(patch: Ints, corners: Ints) -> tuple[Ints, Ints]:
+def _renumber(patch: Ints, face_vertices: Ints) -> tuple[Ints, Ints]:
     """Number patches from 0 in the order of their first vertices; return the patch (n,)
-    of each vertex, and the (m, 3) faces between patches."""
+    of each vertex, and the (m, 3) faces whose vertices are in three patches."""
     is_first = patch == np.arange(len(patch))
-    patch = (np.cumsum(is_first) - 1)[patch]
-    at_corners = patch[corners]
-    is_between = (at_corners != np.roll(at_corners, -1, axis=0)).all(axis=0)
-    return patch, at_corners[:, is_between].T
+    number = np.cumsum(is_first) - 1
+    patch = number[patch]
+    corner = patch[face_vertices]
+    is_between = (corner != np.roll(corner, -1, axis=0)).all(axis=0)
+    return patch, corner[:, is_between].T
 
 
 def _sums(patch: Ints, vectors: Floats, count: int) -> Floats:
