@@ -41,7 +41,7 @@ NOT_MUCH_LARGER = 1.1
 """A radius that is so many times larger than that asked for is used without a
 warning."""
 MAX_FAILED_SHARE = 0.01
-CHUNK = 1024
+CHUNK = 512
 """Vertices worked on at once: the arrays of their neighbours then stay in the
 processor's cache."""
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
@@ -232,13 +232,7 @@ def _quadrics(
     )
     radii_mm = radii_mm[order]
     (pairs, uses), size = edges(mesh), len(mesh.vertices)
-    both = np.concatenate(
-        [
-            pairs,
-            pairs[:, ::-1],
-            np.arange(size)[:, None].repeat(2, axis=1),
-        ]
-    )
+    both = np.concatenate([pairs, pairs[:, ::-1]])
     links = sparse.csr_matrix(
         (np.ones(len(both), dtype=bool), both.T), shape=(size, size)
     )
@@ -290,7 +284,7 @@ def _balls(
         degrees = np.diff(near_links.indptr)
         width = len(near)
         reached = np.zeros(len(centres) * width, dtype=bool)
-        last = np.zeros(len(reached), dtype=np.int32)
+        last = np.empty(len(reached), dtype=np.int32)
         # a vertex of a ball has the place ball · width + column
         place = np.arange(len(centres)) * width + np.searchsorted(near, centres)
         reached[place] = True
