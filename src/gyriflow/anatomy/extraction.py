@@ -146,8 +146,8 @@ def remove_bridges(
     """
     number, _ = number_parts(~mask)
     # the volume is padded, so its first voxel is outside
-    closed = (number == number[0, 0, 0]) & (field > LEVEL)
     inside = field > LEVEL
+    closed = (number == number[0, 0, 0]) & inside
     number, gains = _parts_with_gains(inside, _euler_cells(inside), closed)
     opened = (
         np.bincount(

@@ -150,8 +150,10 @@ def open_fused_sulci(
         return field, affine, {"sheets": 0, "slit_voxels": 0, "opened_mL": 0.0}
     slit = _grow_slits(inside, sheets, cortex, distance)
     opened = whole.copy()
-    opened[slit] = np.minimum(whole[slit], np.float32(SLIT_VALUE))
-    lost = (whole[slit] - opened[slit]).sum(dtype=float)
+    before = whole[slit]
+    after = np.minimum(before, np.float32(SLIT_VALUE))
+    opened[slit] = after
+    lost = (before - after).sum(dtype=float)
     taken = float(lost * size.prod() * ML_PER_MM3)
     return (
         opened,

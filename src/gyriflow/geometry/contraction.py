@@ -101,9 +101,10 @@ def _first_connected(edge_ends: Ints, count: int) -> Ints:
     """Return for each of `count` vertices the first one that it is connected with, by
     edges between the vertices `edge_ends` (2, k)."""
     component = connected(edge_ends.T, count)
+    vertices = np.arange(count)
     first = np.empty(component.max() + 1, dtype=np.int64)
-    # where indices repeat, NumPy keeps the last value
-    first[component[::-1]] = np.arange(count)[::-1]
+    # backwards: of a component's vertices, the last one that is written stays
+    first[component[::-1]] = vertices[::-1]
     return first[component]
 
 
